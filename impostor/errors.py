@@ -1,0 +1,49 @@
+"""The exceptions a user can meet. Every message says where, what the value was and what was expected."""
+
+from __future__ import annotations
+
+from os import PathLike
+
+
+class ImpostorError(Exception):
+    """Something the user gave, or asked for, cannot be done.
+
+    Parameters
+    ----------
+    where : str or path-like
+        The file, flag or argument that is wrong.
+    problem : str
+        The place inside it, the value found and what was expected, on one line.
+    """
+
+    def __init__(self, where: str | PathLike[str], problem: str):
+        self.where = str(where)
+        self.problem = " ".join(str(problem).split())
+        super().__init__(f"{self.where}: {self.problem}")
+
+    def __reduce__(self):
+        return type(self), (self.where, self.problem)
+
+
+class ModelError(ImpostorError):
+    """A model file that cannot be read, or that would not give a true picture."""
+
+
+class FanFileError(ImpostorError):
+    """A `.fan` file that is truncated, altered, newer than this version, or not a fan at all."""
+
+
+class OutputError(ImpostorError):
+    """An output that exists already, or a place that cannot be written."""
+
+
+class SettingsError(ImpostorError):
+    """A number or choice outside what the command or function takes."""
+
+
+class GpuError(ImpostorError):
+    """No OpenGL context, a shader that does not compile, or an image the GPU cannot hold."""
+
+
+class ModelWarning(UserWarning):
+    """Something in a model that was drawn differently from what its file asks for."""
