@@ -219,7 +219,7 @@ def layout_bases(layout: str, count: int, elevation: float) -> NDArray[np.float6
         raise SettingsError("--views", f"{count} views; expected 1 to {MAX_VIEWS}")
     if layout == "ring":
         if not abs(elevation) < np.pi / 2:
-            raise SettingsError("--elevation", f"{np.degrees(elevation):g} degrees; expected more than -90, less than 90")
+            raise SettingsError("--elevation", f"{np.degrees(elevation):g} degrees; expected between -90 and 90")
         return ring_bases(count, elevation)
     if layout == "hemisphere":
         return spiral_bases(count, lowest=0.0)

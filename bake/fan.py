@@ -1,0 +1,135 @@
+"""From a model to a fan: frame the views, capture them, code the normals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bake.capture import Capture
+from bake.resolve import CapturedView, TileLayers, dilate, resolve
+from impostor.errors import SettingsError
+from impostor.fan import DEPTH_CODES, MAX_SIZE, MIN_SIZE, Fan
+from impostor.model import Model
+from impostor.normal_code import mip_codes
+from impostor.views import Views, frame, layout_bases
+
+DILATION = 2  # texels past the silhouette: what bilinear filtering of a view can reach
+VIEWS_AT_ONCE = 16  # exact normals are held for so many views only
+SMALLEST_MIP = 4  # texels
+
+
+def bake_fan(
+    model: Model,
+    *,
+    views: int = 96,
+    elevation_deg: float = 15.0,
+    layout: str = "ring",
+    size: int = 256,
+    distance: float = np.inf,
+    samples: int | None = None,
+    progress: Callable[[int, int], object] = lambda done, total: None,
+) -> Fan:
+    """Bake a model into a fan.
+
+    Parameters
+    ----------
+    model : Model
+    views : int
+        Number of cameras.
+    elevation_deg : float
+        Of a ring of cameras, in degrees.
+    layout : {"ring", "hemisphere", "sphere"}
+    size : int
+        Side of a tile in texels.
+    distance : float
+        From the object to a perspective camera's eye in metres; orthographic if infinite.
+    samples : int, optional
+        Samples along a texel's side; see `bake.capture.Capture`.
+    progress : callable
+        Called with views done and views in all.
+
+    Returns
+    -------
+    Fan
+
+    Raises
+    ------
+    SettingsError
+        A number or a choice out of range.
+    GpuError
+        No OpenGL context.
+
+    References
+    ----------
+    Dinh, Metoyer, Turk, figures 1 and 3.
+    """
+    if not MIN_SIZE <= size <= MAX_SIZE:
+        raise SettingsError("--size", f"{size} texels; expected {MIN_SIZE} to {MAX_SIZE}")
+    bases = layout_bases(layout, views, np.radians(elevation_deg))
+    used = np.concatenate([part.positions[np.unique(part.triangles)] for part in model.primitives])
+    cameras = frame(bases, used, size, distance)
+    layers = _Layers(views, size)
+    # Resolving and coding one view overlaps with drawing the next.
+    with Capture(model, size, samples) as capture, ThreadPoolExecutor(1) as worker:
+        pending: list[Future[None]] = []
+        for index in range(views):
+            captured = capture.view(cameras[index])
+            pending.append(worker.submit(layers.add, index, captured, capture.samples))
+            if len(pending) > 2:
+                pending.pop(0).result()
+            progress(index + 1, views)
+        for future in pending:
+            future.result()
+        samples = capture.samples
+    settings = {
+        "views": views,
+        "elevation": elevation_deg,
+        "layout": layout,
+        "size": size,
+        "perspective": None if np.isinf(distance) else distance,
+        "samples": samples,
+    }
+    return layers.fan(model, layout, cameras, settings)
+
+
+class _Layers:
+    """The layers of a fan while its views come in, in order."""
+
+    def __init__(self, views: int, size: int):
+        self._views = views
+        self._level_sizes = [size]
+        while self._level_sizes[-1] % 2 == 0 and self._level_sizes[-1] // 2 >= SMALLEST_MIP:
+            self._level_sizes.append(self._level_sizes[-1] // 2)
+        self._color = np.zeros((views, size, size, 4), np.uint8)
+        self._depth = np.zeros((views, size, size), np.uint16)
+        self._normal = [np.zeros((views, side, side), np.uint8) for side in self._level_sizes]
+        self._waiting: list[TileLayers] = []
+
+    def add(self, index: int, captured: CapturedView, samples: int) -> None:
+        """Take in the next view; normals are coded for several views at once."""
+        self._waiting.append(resolve(captured, samples))
+        if len(self._waiting) == VIEWS_AT_ONCE or index == self._views - 1:
+            self._code(index + 1 - len(self._waiting))
+            self._waiting.clear()
+
+    def _code(self, first: int) -> None:
+        names = TileLayers.__dataclass_fields__
+        stack = TileLayers(*(np.stack([getattr(tile, name) for tile in self._waiting]) for name in names))
+        layers, filled = dilate(stack, DILATION)
+        part = slice(first, first + len(self._waiting))
+        self._color[part] = layers.color
+        self._depth[part] = np.rint(layers.depth * DEPTH_CODES)
+        covered = layers.coverage > 0
+        levels = mip_codes(layers.normal, layers.coverage, len(self._level_sizes), mask=covered | filled)
+        for stored, codes in zip(self._normal, levels, strict=True):
+            stored[part] = codes
+
+    def fan(self, model: Model, layout: str, views: Views, settings: dict[str, Any]) -> Fan:
+        """All of it, as a fan."""
+        silhouette: NDArray[np.bool_] = self._color[..., 3] >= 128
+        source = {"name": model.name, "sha256": model.source_hash}
+        return Fan(model.name, layout, views, self._color, tuple(self._normal), self._depth, silhouette, source, settings)

@@ -1,0 +1,97 @@
+"""Viewers' cameras: the two matrices that every pass takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from impostor.errors import SettingsError
+from impostor.views import basis_facing, direction
+
+FRAME_MARGIN = 1.02  # the picture is this much larger than the bounding sphere
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """Where a viewer stands and how the world falls on the picture.
+
+    Parameters
+    ----------
+    clip_from_view, view_from_world : ndarray, (4, 4) float64
+        Column-vector matrices in reading order; OpenGL clip space.
+    """
+
+    clip_from_view: NDArray[np.float64]
+    view_from_world: NDArray[np.float64]
+
+    @classmethod
+    def perspective(
+        cls,
+        eye: ArrayLike,
+        target: ArrayLike,
+        fov_deg: float,
+        aspect: float,
+        near: float,
+        far: float,
+    ) -> Camera:
+        """A camera at `eye` that looks at `target`.
+
+        Parameters
+        ----------
+        eye, target : array_like, (3,) float
+            World space.
+        fov_deg : float
+            Vertical field of view in degrees.
+        aspect : float
+            Width over height.
+        near, far : float
+            Metres.
+
+        Raises
+        ------
+        SettingsError
+            Eye and target coincide, or the field of view or the range is impossible.
+        """
+        eye, target = np.asarray(eye, float), np.asarray(target, float)
+        if not np.linalg.norm(eye - target) > 0:
+            raise SettingsError("camera", f"eye and target are both {eye.tolist()}; expected two different points")
+        if not 0 < fov_deg < 180:
+            raise SettingsError("--fov", f"{fov_deg:g} degrees; expected more than 0 and less than 180")
+        if not 0 < near < far:
+            raise SettingsError("camera", f"near {near:g} m, far {far:g} m; expected 0 < near < far")
+        focal = 1 / np.tan(np.radians(fov_deg) / 2)
+        clip = np.zeros((4, 4))
+        clip[0, 0], clip[1, 1] = focal / aspect, focal
+        clip[2, 2:] = -(far + near) / (far - near), -2 * far * near / (far - near)
+        clip[3, 2] = -1
+        return cls(clip, _view_from_world(basis_facing(eye - target), eye))
+
+    @classmethod
+    def orthographic(
+        cls, center: ArrayLike, radius: float, azimuth: float, elevation: float, aspect: float = 1.0
+    ) -> Camera:
+        """A camera without perspective that frames a bounding sphere with a margin of 2 percent.
+
+        Parameters
+        ----------
+        center : array_like, (3,) float
+        radius : float
+            Metres.
+        azimuth, elevation : float
+            Radians; where the camera stands.
+        aspect : float
+            Width over height; the sphere fits the shorter side.
+        """
+        half = radius * FRAME_MARGIN
+        # Ground beyond the sphere is seen too: leave it room along the line of sight.
+        depth = 20 * radius
+        clip = np.diag([1 / (half * max(aspect, 1)), min(aspect, 1) / half, -1 / depth, 1.0])
+        return cls(clip, _view_from_world(basis_facing(direction(azimuth, elevation)), np.asarray(center, float)))
+
+
+def _view_from_world(basis: NDArray[np.float64], origin: NDArray[np.float64]) -> NDArray[np.float64]:
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = basis, -basis @ origin
+    return matrix

@@ -1,0 +1,57 @@
+"""Lights on the GPU, for every pass that shades."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import moderngl
+import numpy as np
+from numpy.typing import ArrayLike
+
+from impostor.lighting import DirectionalLight
+from runtime.gpu import check_texture_size, set_uniforms
+
+
+class LightTable:
+    """Any number of directional lights and an ambient colour, as the texture that `lights.glsl` reads.
+
+    Attributes
+    ----------
+    version : int
+        Grows whenever the lights change; what was lit with an older version is stale.
+    """
+
+    def __init__(self, ctx: moderngl.Context):
+        self._ctx = ctx
+        self._held: tuple[object, ...] | None = None
+        self._texture = ctx.texture((2, 1), 4, dtype="f4")
+        self._count = 0
+        self._ambient = (0.0, 0.0, 0.0)
+        self.version = 0
+
+    def update(self, lights: Sequence[DirectionalLight], ambient: ArrayLike) -> None:
+        """Take over the lights of this frame; nothing is written when they are those of the last one."""
+        red, green, blue = np.broadcast_to(np.asarray(ambient, float), (3,)).tolist()
+        wanted = (tuple(lights), (red, green, blue))
+        if wanted == self._held:
+            return
+        check_texture_size(self._ctx, f"{len(lights)} lights", 2, len(lights))
+        rows = np.zeros((max(len(lights), 1), 2, 4), np.float32)
+        for row, light in zip(rows, lights, strict=False):
+            row[0, :3], row[1, :3] = light.toward, light.color
+        if self._texture.height != len(rows):
+            self._texture.release()
+            self._texture = self._ctx.texture((2, len(rows)), 4, dtype="f4")
+        self._texture.write(rows.tobytes())
+        self._texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._held, self._count, self._ambient = wanted, len(lights), (red, green, blue)
+        self.version += 1
+
+    def bind(self, program: moderngl.Program, unit: int) -> None:
+        """Give a program that includes `lights.glsl` its uniforms."""
+        self._texture.use(unit)
+        set_uniforms(program, lights=unit, light_count=self._count, ambient=self._ambient)
+
+    def release(self) -> None:
+        """Free the texture."""
+        self._texture.release()

@@ -1,0 +1,144 @@
+"""Light into pictures: the colormap pass writes the 225 entries, the relight pass sends tiles through them."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from impostor.normal_code import BYTE_TO_NORMAL
+from runtime.fan_textures import FanTextures
+from runtime.gl_state import set_state
+from runtime.gpu import load_program, set_uniforms
+from runtime.lights import LightTable
+from runtime.tiles import TileCache
+
+ROW_DTYPE = np.dtype(
+    [
+        ("row", "f4"),
+        ("basis", "f4", (3, 3)),
+        ("albedo", "f4", (4,)),
+        ("gloss", "f4", (2,)),
+    ]
+)
+TILE_DTYPE = np.dtype([("place", "f4", (4,)), ("origin", "f4", (3,))])
+CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]], np.float32)
+
+
+class InstanceBuffer:
+    """A vertex buffer of per-instance records that grows as needed."""
+
+    def __init__(self, ctx: moderngl.Context, dtype: np.dtype, count: int = 64):
+        self.buffer = ctx.buffer(reserve=dtype.itemsize * count, dynamic=True)
+
+    def write(self, records: NDArray[np.void]) -> None:
+        """Upload the records; the buffer's old contents are given up, so the GPU need not wait."""
+        self.buffer.orphan(max(records.nbytes, self.buffer.size))
+        self.buffer.write(records)
+
+    def release(self) -> None:
+        """Free the buffer."""
+        self.buffer.release()
+
+
+class ColormapPass:
+    """Evaluates colormaps on the GPU, one texture row each; equals `impostor.lighting.colormap`.
+
+    Attributes
+    ----------
+    texture : moderngl.Texture
+        (512, rows) float32 RGBA: entries 0-255 multiply the albedo, 256-511 are added on top.
+    """
+
+    ROWS = 1024
+
+    def __init__(self, ctx: moderngl.Context):
+        self._program = load_program(ctx, "colormap.vert", "colormap.frag")
+        self._normals = ctx.texture((256, 1), 4, _padded_normals().tobytes(), dtype="f4")
+        self.texture = ctx.texture((512, self.ROWS), 4, dtype="f4")
+        self.texture.filter = self._normals.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._target = ctx.framebuffer([self.texture])
+        self._corners = ctx.buffer(CORNERS)
+        self._rows = InstanceBuffer(ctx, ROW_DTYPE)
+        self._array = ctx.vertex_array(
+            self._program,
+            [
+                (self._corners, "2f", "corner"),
+                (self._rows.buffer, "1f 3f 3f 3f 4f 2f/i", "row", "right", "up", "back", "albedo", "gloss"),
+            ],
+        )
+
+    def write(self, rows: NDArray[np.void], lights: LightTable, normals_for: NDArray[np.float64] | None = None) -> None:
+        """Fill the rows named in a ROW_DTYPE array; changes the bound framebuffer and texture units 0 and 1.
+
+        With `normals_for`, a viewer's (3, 3) rotation from world to view, the entries are that viewer's normals as
+        n / 2 + 1/2 instead of light.
+        """
+        self._rows.write(rows)
+        self._target.use()
+        set_state()
+        self._normals.use(0)
+        lights.bind(self._program, unit=1)
+        set_uniforms(self._program, byte_to_normal=0, row_count=self.ROWS)
+        show_normals = normals_for is not None
+        set_uniforms(
+            self._program, show_normals=show_normals, view_from_world=normals_for if show_normals else np.eye(3)
+        )
+        self._array.render(moderngl.TRIANGLE_STRIP, instances=len(rows))
+
+    def release(self) -> None:
+        """Free everything this pass made."""
+        for resource in (self._array, self._rows, self._corners, self._target, self.texture, self._normals):
+            resource.release()
+        self._program.release()
+
+
+class RelightPass:
+    """Draws tiles of a fan through their colormap rows into the tile cache."""
+
+    def __init__(self, ctx: moderngl.Context):
+        self._corners = ctx.buffer(CORNERS)
+        self._tiles = InstanceBuffer(ctx, TILE_DTYPE)
+        self._arrays = {name: self._array(ctx, name) for name in ("uniform", "textured", "normal")}
+
+    def _array(self, ctx: moderngl.Context, name: str) -> moderngl.VertexArray:
+        layout = [(self._corners, "2f", "corner"), (self._tiles.buffer, "4f 3f/i", "place", "origin")]
+        return ctx.vertex_array(load_program(ctx, "relight.vert", f"relight_{name}.frag"), layout)
+
+    def draw(
+        self,
+        fan: FanTextures,
+        tiles: NDArray[np.void],
+        colormap: moderngl.Texture,
+        cache: TileCache,
+        normals: bool = False,
+    ) -> None:
+        """Relight a TILE_DTYPE array of tiles; changes the bound framebuffer and texture units 0 to 3.
+
+        With `normals`, the colormap's colours are shown as they are, on every object.
+        """
+        array = self._arrays["normal" if normals else "uniform" if fan.one_texture else "textured"]
+        self._tiles.write(tiles)
+        cache.target.use()
+        set_state()
+        fan.normal.use(0)
+        fan.depth.use(1)
+        colormap.use(2)
+        samplers = {"fan_normal": 0, "fan_depth": 1, "colormap": 2}
+        if fan.color is not None and not normals:
+            fan.color.use(3)
+            samplers["fan_color"] = 3
+        set_uniforms(array.program, cache_size=(cache.side, cache.side), **samplers)
+        array.render(moderngl.TRIANGLE_STRIP, instances=len(tiles))
+
+    def release(self) -> None:
+        """Free everything this pass made."""
+        for array in self._arrays.values():
+            array.release()
+            array.program.release()
+        for resource in (self._tiles, self._corners):
+            resource.release()
+
+
+def _padded_normals() -> NDArray[np.float32]:
+    return np.pad(BYTE_TO_NORMAL, ((0, 0), (0, 1))).astype(np.float32)

@@ -1,0 +1,195 @@
+"""The game-facing interface: fans and meshes in the caller's own OpenGL context, and the order of the passes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import moderngl
+import numpy as np
+from numpy.typing import ArrayLike
+
+from impostor.fan import Fan
+from impostor.lighting import DirectionalLight, Gloss
+from impostor.model import Model
+from impostor.shadow_projection import Ground
+from runtime.fan_textures import FanTextures
+from runtime.gl_state import preserved_state
+from runtime.grounds import GroundPass, GroundSurface
+from runtime.impostors import Batch, ImpostorPass
+from runtime.instances import Instances, Viewer
+from runtime.lights import LightTable
+from runtime.meshes import MeshBuffers, MeshInstance, MeshPass
+from runtime.shadows import ShadowPass
+
+DEFAULT_LIGHTS = (DirectionalLight.from_angles(40, 45),)
+
+
+class ImpostorRenderer:
+    """Draws relightable fans, meshes and their shadows into whatever framebuffer the caller has bound.
+
+    Every `draw...` call takes the caller's two camera matrices, (4, 4) column-vector matrices as read on paper, draws
+    into the bound framebuffer and viewport, and puts back all OpenGL state. Colours are written on the sRGB curve.
+
+    Parameters
+    ----------
+    ctx : moderngl.Context
+        The caller's; OpenGL 3.3 or newer.
+    cache_side : int
+        Side of the cache of relit tiles in texels (6 bytes a texel).
+
+    Attributes
+    ----------
+    lights : sequence of DirectionalLight
+        May be replaced at any time; the next draw shows it.
+    ambient : float or (3,) array_like
+        Linear light that reaches every normal.
+
+    Examples
+    --------
+    >>> renderer = ImpostorRenderer(ctx)                                      # doctest: +SKIP
+    >>> trees = renderer.add(fan, positions, yaws, scales)                    # doctest: +SKIP
+    >>> renderer.draw_shadows(clip_from_view, view_from_world, ground)        # doctest: +SKIP
+    >>> renderer.draw(clip_from_view, view_from_world)                        # doctest: +SKIP
+    """
+
+    def __init__(self, ctx: moderngl.Context, cache_side: int = 4096):
+        self._ctx = ctx
+        self.lights: Sequence[DirectionalLight] = DEFAULT_LIGHTS
+        self.ambient: ArrayLike = 0.25
+        with preserved_state(ctx):
+            self._impostors = ImpostorPass(ctx, cache_side)
+            self._mesh_pass, self._ground_pass, self._shadows = MeshPass(ctx), GroundPass(ctx), ShadowPass(ctx)
+            self._table = LightTable(ctx)
+        self._batches: list[Batch] = []
+        self._meshes: list[MeshInstance] = []
+
+    def add(
+        self,
+        fan: Fan,
+        positions: ArrayLike = (0.0, 0.0, 0.0),
+        yaws: ArrayLike = 0.0,
+        scales: ArrayLike = 1.0,
+        gloss: Gloss | None = None,
+    ) -> Instances:
+        """Place copies of a fan; see `Instances`. A fan that was added before shares its textures."""
+        instances = Instances(fan, positions, yaws, scales, gloss)
+        textures = next((batch.textures for batch in self._batches if batch.instances.fan is fan), None)
+        if textures is None:
+            with preserved_state(self._ctx):
+                textures = FanTextures(self._ctx, fan)
+        self._batches.append(Batch(instances, textures))
+        return instances
+
+    def add_mesh(self, model: Model, world_from_model: ArrayLike | None = None, gloss: Gloss | None = None):
+        """Place a polygon mesh.
+
+        Parameters
+        ----------
+        model : Model
+            A model that was added before shares its buffers.
+        world_from_model : array_like, (4, 4) float, optional
+            Rotation, translation and uniform scale.
+        gloss : Gloss, optional
+
+        Returns
+        -------
+        MeshInstance
+            Its `world_from_model` may be changed at any time.
+        """
+        buffers = next((mesh.buffers for mesh in self._meshes if mesh.buffers.model is model), None)
+        if buffers is None:
+            with preserved_state(self._ctx):
+                buffers = MeshBuffers(self._ctx, model)
+        matrix = np.eye(4) if world_from_model is None else np.array(world_from_model, float)
+        self._meshes.append(MeshInstance(buffers, matrix, gloss or Gloss()))
+        return self._meshes[-1]
+
+    def remove(self, placed: Instances | MeshInstance) -> None:
+        """Take copies or a mesh away again; what is on the GPU goes with the last copy of its fan or model."""
+        batches = [batch for batch in self._batches if batch.instances is placed]
+        meshes = [mesh for mesh in self._meshes if mesh is placed]
+        self._batches = [batch for batch in self._batches if batch.instances is not placed]
+        self._meshes = [mesh for mesh in self._meshes if mesh is not placed]
+        for batch in batches:
+            if not any(other.textures is batch.textures for other in self._batches):
+                self._impostors.forget()
+                self._shadows.forget(batch.instances.fan)
+                batch.textures.release()
+        for mesh in meshes:
+            if not any(other.buffers is mesh.buffers for other in self._meshes):
+                mesh.buffers.release()
+
+    def draw(self, clip_from_view: ArrayLike, view_from_world: ArrayLike, output: str = "lit") -> None:
+        """Draw every visible instance: far to near, premultiplied and blended; depth is tested and written.
+
+        Draw opaque things and shadows first, so that the edges blend with what is behind them.
+
+        Parameters
+        ----------
+        clip_from_view, view_from_world : array_like, (4, 4) float
+        output : {"lit", "albedo", "normal"}
+            Normals are the viewer's, as n / 2 + 1/2.
+
+        Raises
+        ------
+        SettingsError
+            A matrix of another shape, or one that cannot be inverted.
+        """
+        with preserved_state(self._ctx) as state:
+            viewer = Viewer.from_matrices(clip_from_view, view_from_world, state.viewport)
+            self._update_lights(output)
+            self._impostors.draw(state, self._batches, viewer, self._table, output)
+
+    def draw_meshes(self, clip_from_view: ArrayLike, view_from_world: ArrayLike, output: str = "lit") -> None:
+        """Draw the meshes that `add_mesh` placed; parameters as `draw`."""
+        with preserved_state(self._ctx) as state:
+            viewer = Viewer.from_matrices(clip_from_view, view_from_world, state.viewport)
+            self._update_lights(output)
+            self._mesh_pass.draw(state, self._meshes, viewer, self._table, output)
+
+    def draw_ground(
+        self, clip_from_view: ArrayLike, view_from_world: ArrayLike, ground: Ground, surface: GroundSurface
+    ) -> None:
+        """Draw a lit plane, for callers who have no ground of their own."""
+        with preserved_state(self._ctx) as state:
+            viewer = Viewer.from_matrices(clip_from_view, view_from_world, state.viewport)
+            self._update_lights("lit")
+            self._ground_pass.draw(state, viewer, self._table, ground, surface)
+
+    def draw_shadows(self, clip_from_view: ArrayLike, view_from_world: ArrayLike, ground: Ground) -> None:
+        """Darken the caller's ground where fans and meshes keep the lights from it.
+
+        Depth is tested against what is drawn already and not written. Every light that is above the ground casts.
+
+        Parameters
+        ----------
+        clip_from_view, view_from_world : array_like, (4, 4) float
+        ground : Ground
+            The plane on which the caller has drawn a ground.
+        """
+        with preserved_state(self._ctx) as state:
+            viewer = Viewer.from_matrices(clip_from_view, view_from_world, state.viewport)
+            fans = [batch.instances for batch in self._batches]
+            self._shadows.draw(state, fans, self._meshes, viewer, self.lights, self.ambient, ground)
+
+    def _update_lights(self, output: str) -> None:
+        if output == "albedo":
+            self._table.update((), 1.0)
+        else:
+            self._table.update(self.lights, self.ambient)
+
+    @property
+    def statistics(self) -> dict[str, int]:
+        """Of the last draw: instances, tiles, relit tiles, mip levels lost to a full cache."""
+        return dict(self._impostors.statistics)
+
+    def release(self) -> None:
+        """Free everything on the GPU; the context stays the caller's."""
+        for textures in {id(batch.textures): batch.textures for batch in self._batches}.values():
+            textures.release()
+        for buffers in {id(mesh.buffers): mesh.buffers for mesh in self._meshes}.values():
+            buffers.release()
+        self._batches.clear()
+        self._meshes.clear()
+        for part in (self._impostors, self._mesh_pass, self._ground_pass, self._shadows, self._table):
+            part.release()

@@ -1,0 +1,27 @@
+#version 330
+// One instance draws one object: a quad in the plane of its fan view.
+uniform mat4 clip_from_world;
+uniform vec2 cache_size;
+in vec2 corner;       // 0..1, y up
+in vec3 center;       // world
+in vec3 right, up;    // world, from the middle of the tile to its edge
+in vec3 toward_eye;   // world: what one metre of depth along the view's back moves the picture toward the eye
+in vec4 rectangle;    // the covered part of the tile: left, bottom, right, top in -1..1
+in vec3 place;        // x, y and side of the relit tile in the cache
+in vec2 depth_range;  // metres along back at depth 0, and from there to depth 1
+out vec2 v_texel;
+out vec2 v_plane_zw;
+flat out vec2 v_eye_zw;
+flat out vec4 v_bounds;
+flat out vec2 v_depth_range;
+
+void main() {
+    vec2 plane = mix(rectangle.xy, rectangle.zw, corner);
+    gl_Position = clip_from_world * vec4(center + plane.x * right + plane.y * up, 1.0);
+    // Row 0 of a tile is its top: the one flip between images and OpenGL.
+    v_texel = place.xy + (vec2(plane.x, -plane.y) * 0.5 + 0.5) * place.z;
+    v_bounds = vec4(place.xy + 0.5, place.xy + place.z - 0.5);
+    v_plane_zw = gl_Position.zw;
+    v_eye_zw = (clip_from_world * vec4(toward_eye, 0.0)).zw;
+    v_depth_range = depth_range;
+}

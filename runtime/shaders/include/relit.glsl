@@ -1,0 +1,16 @@
+// What a relit tile holds: colour on the sRGB curve, premultiplied by coverage, and depth.
+uniform sampler2D fan_normal;  // r: normal code / 255, g: coverage
+uniform sampler2D fan_depth;
+uniform sampler2D colormap;
+flat in ivec2 v_shift;
+flat in int v_level, v_row;
+layout(location = 0) out vec4 relit;
+layout(location = 1) out float depth;
+
+vec4 colormap_entry(float code, int half) {
+    return texelFetch(colormap, ivec2(int(code * 255.0 + 0.5) + 256 * half, v_row), 0);
+}
+
+float depth_at(ivec2 texel) {
+    return texelFetch(fan_depth, (texel << v_level) + ((1 << v_level) >> 1), 0).r;
+}

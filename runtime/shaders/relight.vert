@@ -1,0 +1,15 @@
+#version 330
+// One instance relights one tile of a fan into its place in the tile cache.
+uniform vec2 cache_size;
+in vec2 corner;
+in vec4 place;   // x, y and side in the cache; mip level of the fan
+in vec3 origin;  // first texel of the tile at that level; row of the colormap
+flat out ivec2 v_shift;
+flat out int v_level, v_row;
+
+void main() {
+    v_shift = ivec2(origin.xy) - ivec2(place.xy);
+    v_level = int(place.w);
+    v_row = int(origin.z);
+    gl_Position = vec4((place.xy + corner * place.z) / cache_size * 2.0 - 1.0, 0.0, 1.0);
+}

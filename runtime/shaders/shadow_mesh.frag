@@ -1,0 +1,10 @@
+#version 330
+#include "surface.glsl"
+in vec2 v_uv;
+in float v_alpha;
+out vec4 mark;
+
+void main() {
+    if (cut_out(v_uv, v_alpha)) discard;
+    mark = vec4(1.0);
+}

@@ -1,0 +1,286 @@
+"""The shadow pass: strips of fans and triangles of meshes, marked on the ground and taken from its light once.
+
+The marks are a texture of the pass's own, one light a channel, and do what a stencil would: overlapping strips mark
+a pixel once. moderngl makes no framebuffer with a stencil, so few callers have one; and several lights fit in one
+texture, so that each takes away just the light it gave.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import moderngl
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from impostor.fan import Fan
+from impostor.lighting import DirectionalLight
+from impostor.shadow_projection import Ground, casts_shadow, ground_from_sight, strip_points
+from impostor.strips import silhouette_strips
+from runtime.gl_state import CallerState, set_state
+from runtime.gpu import load_program, set_uniforms
+from runtime.instances import Instances, Quads, Viewer, quads_toward
+from runtime.meshes import MeshInstance, draw_parts
+from runtime.relight import InstanceBuffer
+
+CHANNELS = 4
+ZERO, SOURCE_COLOR = 0x0000, 0x0300
+CASTER_DTYPE = np.dtype([("position_scale", "f4", (4,)), ("turn", "f4", (2,)), ("rows", "f4", (4, 4))])
+
+
+class StripBuffers:
+    """The strips of a fan's silhouettes on the GPU, cut view by view as lights ask for them."""
+
+    def __init__(self, ctx: moderngl.Context, program: moderngl.Program, casters: InstanceBuffer):
+        self._ctx, self._program, self._casters = ctx, program, casters
+        self._held: dict[tuple[int, int], tuple[Fan, moderngl.VertexArray | None, list[moderngl.Buffer]]] = {}
+
+    def vertex_array(self, fan: Fan, view: int) -> moderngl.VertexArray | None:
+        """The strips of one view, or None where its silhouette is empty."""
+        key = (id(fan), view)
+        if key not in self._held:
+            strips = silhouette_strips(fan.silhouette[view])
+            triangles = strips.triangles()
+            array, buffers = None, []
+            if len(triangles):
+                points = strip_points(strips, fan.views[view], fan.depth[view])
+                buffers = [self._ctx.buffer(points.astype("f4").tobytes()), self._ctx.buffer(triangles.tobytes())]
+                names = ("position_scale", "turn", "row0", "row1", "row2", "row3")
+                layout = [
+                    (buffers[0], "3f", "point"),
+                    (self._casters.buffer, "4f 2f 4f 4f 4f 4f/i", *names),
+                ]
+                array = self._ctx.vertex_array(self._program, layout, buffers[1])
+            self._held[key] = (fan, array, buffers)
+        return self._held[key][1]
+
+    def forget(self, fan: Fan) -> None:
+        """Free the strips of a fan."""
+        for key in [key for key, held in self._held.items() if held[0] is fan]:
+            _, array, buffers = self._held.pop(key)
+            for resource in (array, *buffers):
+                if resource is not None:
+                    resource.release()
+
+    def release(self) -> None:
+        """Free every strip."""
+        for fan in {id(held[0]): held[0] for held in self._held.values()}.values():
+            self.forget(fan)
+
+
+class ShadowPass:
+    """Darkens the ground where lights do not reach it.
+
+    Parameters
+    ----------
+    ctx : moderngl.Context
+    """
+
+    def __init__(self, ctx: moderngl.Context):
+        self._ctx = ctx
+        self._strip_program = load_program(ctx, "shadow_strips.vert", "shadow_strips.frag")
+        self._mesh_program = load_program(ctx, "shadow_mesh.vert", "shadow_mesh.frag")
+        self._darken_program = load_program(ctx, "shadow_darken.vert", "shadow_darken.frag")
+        self._casters = InstanceBuffer(ctx, CASTER_DTYPE)
+        self._strips = StripBuffers(ctx, self._strip_program, self._casters)
+        self._corners = ctx.buffer(reserve=4 * 12, dynamic=True)
+        self._darken = ctx.vertex_array(self._darken_program, [(self._corners, "3f", "corner")])
+        self._marks: moderngl.Texture | None = None
+        self._target: moderngl.Framebuffer | None = None
+
+    def draw(
+        self,
+        state: CallerState,
+        fans: Sequence[Instances],
+        meshes: Sequence[MeshInstance],
+        viewer: Viewer,
+        lights: Sequence[DirectionalLight],
+        ambient: ArrayLike,
+        ground: Ground,
+    ) -> None:
+        """Darken what lies on the ground plane in the caller's framebuffer.
+
+        Depth is tested against what is drawn and not written. A viewer who is not above the ground sees no shadow.
+        """
+        if ground.plane @ viewer.eye <= 0 or not (len(fans) or len(meshes)):
+            return
+        shares = _shares(lights, ambient, ground)
+        casting = [
+            index for index, share in enumerate(shares) if casts_shadow(lights[index].toward, ground) and share.any()
+        ]
+        for start in range(0, len(casting), CHANNELS):
+            group = casting[start : start + CHANNELS]
+            corners = _ground_rectangle(fans, meshes, [lights[index] for index in group], ground)
+            if corners is None:
+                continue
+            self._mark(fans, meshes, viewer, [lights[index] for index in group], ground)
+            self._darken_ground(state, viewer, corners, [shares[index] for index in group])
+
+    def _mark(
+        self,
+        fans: Sequence[Instances],
+        meshes: Sequence[MeshInstance],
+        viewer: Viewer,
+        lights: Sequence[DirectionalLight],
+        ground: Ground,
+    ) -> None:
+        target = self._target_for(viewer)
+        target.use()
+        set_state(color_mask=(True, True, True, True))
+        target.clear()
+        for channel, light in enumerate(lights):
+            mask = tuple(channel == other for other in range(CHANNELS))
+            everywhere = {
+                "clip_from_world": viewer.clip_from_world,
+                "ground": tuple(ground.plane),
+                "toward_light": light.toward,
+            }
+            if fans:
+                set_uniforms(self._strip_program, **everywhere)
+                set_state(color_mask=mask)  # type: ignore[arg-type]
+                for instances in fans:
+                    self._mark_fan(instances, viewer, light, ground)
+            if meshes:
+                set_uniforms(self._mesh_program, **everywhere)
+                for mesh in meshes:
+                    set_uniforms(self._mesh_program, world_from_model=np.asarray(mesh.world_from_model))
+                    set_state(color_mask=mask)  # type: ignore[arg-type]
+                    draw_parts(self._ctx, mesh.buffers, self._mesh_program, depth=False)
+
+    def _mark_fan(self, instances: Instances, viewer: Viewer, light: DirectionalLight, ground: Ground) -> None:
+        seen = quads_toward(instances, viewer.eye)
+        light_views = quads_toward(instances, np.append(light.toward, 0.0), seen.index).view
+        if not len(seen):
+            return
+        order = np.argsort(light_views, kind="stable")
+        casters = _casters(instances, seen.take(order), viewer, ground)
+        views, first, count = np.unique(light_views[order], return_index=True, return_counts=True)
+        self._casters.write(casters)
+        for view, start, number in zip(views, first, count, strict=True):
+            array = self._strips.vertex_array(instances.fan, int(view))
+            if array is not None:
+                if len(views) > 1:
+                    self._casters.write(casters[start : start + number])
+                array.render(moderngl.TRIANGLES, instances=int(number))
+
+    def _darken_ground(
+        self, state: CallerState, viewer: Viewer, corners: NDArray[np.floating], shares: Sequence[NDArray[np.float64]]
+    ) -> None:
+        assert self._marks is not None
+        state.bind_target()
+        set_state(depth_test=True, blend=(ZERO, SOURCE_COLOR), polygon_offset=(-1.0, -4.0))
+        self._marks.use(0)
+        share = np.zeros((CHANNELS, 3))
+        share[: len(shares)] = shares
+        set_uniforms(
+            self._darken_program,
+            clip_from_world=viewer.clip_from_world,
+            marks=0,
+            mark_origin=viewer.viewport[:2],
+            share=[tuple(row) for row in share.tolist()],
+        )
+        self._corners.write(corners.astype("f4").tobytes())
+        self._darken.render(moderngl.TRIANGLE_STRIP)
+
+    def _target_for(self, viewer: Viewer) -> moderngl.Framebuffer:
+        size = (max(viewer.viewport[2], 1), max(viewer.viewport[3], 1))
+        if self._marks is None or self._marks.size != size or self._target is None:
+            self._release_target()
+            self._marks = self._ctx.texture(size, CHANNELS)
+            self._marks.filter = (moderngl.LINEAR, moderngl.LINEAR)
+            self._marks.repeat_x = self._marks.repeat_y = False
+            self._target = self._ctx.framebuffer([self._marks])
+        return self._target
+
+    def _release_target(self) -> None:
+        for resource in (self._target, self._marks):
+            if resource is not None:
+                resource.release()
+        self._target = self._marks = None
+
+    def forget(self, fan: Fan) -> None:
+        """Free what was made for a fan."""
+        self._strips.forget(fan)
+
+    def release(self) -> None:
+        """Free everything this pass made."""
+        self._release_target()
+        self._strips.release()
+        self._casters.release()
+        for resource in (self._darken, self._corners):
+            resource.release()
+        for program in (self._strip_program, self._mesh_program, self._darken_program):
+            program.release()
+
+
+def _shares(lights: Sequence[DirectionalLight], ambient: ArrayLike, ground: Ground) -> list[NDArray[np.float64]]:
+    """Each light's part (3,) of the linear light on the ground."""
+    given = [max(float(ground.normal @ light.toward), 0.0) * np.array(light.color) for light in lights]
+    total = np.sum([np.broadcast_to(np.asarray(ambient, float), (3,)), *given], axis=0)
+    return [part / np.maximum(total, 1e-9) for part in given]
+
+
+def _casters(instances: Instances, seen: Quads, viewer: Viewer, ground: Ground) -> NDArray[np.void]:
+    """Placement, and `shadow_projection.viewer_ground_from_ground`, of many instances at once."""
+    views = instances.fan.views
+    casters = np.zeros(len(seen), CASTER_DTYPE)
+    yaws = instances.yaws[seen.index]
+    casters["position_scale"][:, :3] = instances.positions[seen.index]
+    casters["position_scale"][:, 3] = seen.scale
+    casters["turn"] = np.stack([np.cos(yaws), np.sin(yaws)], axis=-1)
+    plane_from_world = np.zeros((len(seen), 3, 4))
+    plane_from_world[:, :, :3] = seen.basis
+    plane_from_world[:, :, 3] = -np.einsum("nij,nj->ni", seen.basis, seen.center)
+    if np.isfinite(views.distance):
+        eye_distance = views.distance * seen.scale
+        plane_from_world[:, :2] *= eye_distance[:, None, None]
+        plane_from_world[:, 2] *= -1
+        plane_from_world[:, 2, 3] += eye_distance
+    else:
+        plane_from_world[:, 2] = [0, 0, 0, 1]
+    world_from_plane = np.zeros((len(seen), 4, 3))
+    world_from_plane[:, :3] = np.stack([seen.basis[:, 0], seen.basis[:, 1], seen.center], axis=-1)
+    world_from_plane[:, 3, 2] = 1
+    casters["rows"] = ground_from_sight(viewer.eye, ground) @ world_from_plane @ plane_from_world
+    return casters
+
+
+def _ground_rectangle(
+    fans: Sequence[Instances],
+    meshes: Sequence[MeshInstance],
+    lights: Sequence[DirectionalLight],
+    ground: Ground,
+) -> NDArray[np.floating] | None:
+    """Corners (4, 3), as a triangle strip, of a rectangle on the ground that holds every shadow; None without any."""
+    spheres = [_mesh_sphere(mesh) for mesh in meshes]
+    for instances in fans:
+        views = instances.fan.views
+        reach = np.linalg.norm(views.center, axis=-1).max() + views.radius.max() * 2
+        shown = instances.visible
+        spheres += [
+            (place, reach * scale)
+            for place, scale in zip(instances.positions[shown], instances.scales[shown], strict=True)
+        ]
+    if not spheres:
+        return None
+    centers, radii = np.array([place for place, _ in spheres]), np.array([radius for _, radius in spheres])
+    tangent = np.cross(ground.normal, np.eye(3)[np.argmin(np.abs(ground.normal))])
+    axes = np.stack([tangent / np.linalg.norm(tangent), np.cross(ground.normal, tangent / np.linalg.norm(tangent))])
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    for light in lights:
+        slope = np.array(light.toward) / (ground.normal @ light.toward)
+        height = centers @ ground.normal - ground.offset
+        middle = (centers - height[:, None] * slope) @ axes.T
+        # A sphere's shadow is longer than it is wide by the light's slope.
+        reach = (radii * (np.linalg.norm(slope) + 1))[:, None]
+        low = np.minimum(low, (middle - reach).min(axis=0))
+        high = np.maximum(high, (middle + reach).max(axis=0))
+    corners = np.array([[low[0], low[1]], [high[0], low[1]], [low[0], high[1]], [high[0], high[1]]])
+    return corners @ axes + ground.offset * ground.normal
+
+
+def _mesh_sphere(mesh: MeshInstance) -> tuple[NDArray[np.float64], float]:
+    low, high = mesh.buffers.model.bounds
+    matrix = np.asarray(mesh.world_from_model, float)
+    center = matrix[:3, :3] @ ((low + high) / 2) + matrix[:3, 3]
+    return center, float(np.linalg.norm(high - low) / 2 * np.abs(np.linalg.det(matrix[:3, :3])) ** (1 / 3))
