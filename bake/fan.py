@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from impostor.views import Views, frame, layout_bases
 DILATION = 2  # texels past the silhouette: what bilinear filtering of a view can reach
 VIEWS_AT_ONCE = 16  # exact normals are held for so many views only
 SMALLEST_MIP = 4  # texels
+STEEPEST_PLANE = 1.5  # slope; steeper quads lose more of their sides than they gain in the middle
 
 
 def bake_fan(
@@ -132,4 +134,28 @@ class _Layers:
         """All of it, as a fan."""
         silhouette: NDArray[np.bool_] = self._color[..., 3] >= 128
         source = {"name": model.name, "sha256": model.source_hash}
-        return Fan(model.name, layout, views, self._color, tuple(self._normal), self._depth, silhouette, source, settings)
+        views = replace(views, plane=self._planes(views, silhouette))
+        normal = tuple(self._normal)
+        return Fan(model.name, layout, views, self._color, normal, self._depth, silhouette, source, settings)
+
+    def _planes(self, views: Views, silhouette: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """The plane (V, 3) nearest to each view's surface, by least squares over its texels."""
+        size = silhouette.shape[-1]
+        across = (np.arange(size) + 0.5) * (2 / size) - 1
+        planes = np.zeros((len(views), 3))
+        for plane, view, mask, codes in zip(planes, views, silhouette, self._depth, strict=True):
+            rows, columns = np.nonzero(mask)
+            if len(rows) == 0:
+                continue
+            low, high = view.depth_range
+            z = low + codes[mask] * ((high - low) / DEPTH_CODES)
+            plane[0] = z.mean()
+            if np.isinf(view.distance):
+                # A perspective picture on a tilted quad would need a projective texture.
+                points = np.stack([across[columns], -across[rows]], axis=-1) * view.radius
+                middle = points.mean(axis=0)
+                centred = points - middle
+                slope = np.linalg.lstsq(centred, z - plane[0], rcond=1e-6)[0]
+                slope *= min(1, STEEPEST_PLANE / max(np.hypot(*slope), 1e-12))
+                plane[:] = plane[0] - slope @ middle, *slope
+        return planes

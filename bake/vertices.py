@@ -51,7 +51,7 @@ def vertex_records(primitive: Primitive, origin: NDArray[Any]) -> tuple[NDArray[
 
     Returns
     -------
-    vertices : ndarray, (N,) of position 3 float32, normal 3 float32 [, uv 2 float32] [, color 4 uint16, linear]
+    vertices : ndarray, (N,) of position 3 float32, normal 3 float32 [, uv 2 float32] [, color 4 float16, linear]
     triangles : ndarray, (M, 3) uint32
     """
     fields: dict[str, NDArray[Any]] = {
@@ -62,7 +62,7 @@ def vertex_records(primitive: Primitive, origin: NDArray[Any]) -> tuple[NDArray[
         fields["uv"] = primitive.uvs.astype(np.float32, copy=False)
     if primitive.colors is not None:
         linear = np.concatenate([LINEAR_FROM_SRGB[primitive.colors[:, :3]], primitive.colors[:, 3:] / 255], axis=1)
-        fields["color"] = np.rint(linear * 65535).astype(np.uint16)
+        fields["color"] = linear.astype(np.float16)
     triangles = np.ascontiguousarray(primitive.triangles, np.uint32)
     order: Any = slice(None)
     if len(triangles) >= REORDER_FROM:

@@ -111,8 +111,18 @@ class Model:
         ModelError
             When an index is out of range, a number is not finite, or no triangle has any area.
         """
-        arrays = [None if array is None else np.asarray(array) for array in (normals, uvs, colors)]
-        part = Part("arrays", np.asarray(positions), np.asarray(triangles), *arrays, None, material or Material())
+        normals, uvs, colors = (None if array is None else np.asarray(array) for array in (normals, uvs, colors))
+        if material is not None and material.texture is not None and uvs is None:
+            raise ModelError(name, "material has a texture and uvs are None, expected uvs of shape (N, 2)")
+        part = Part(
+            "arrays",
+            np.asarray(positions),
+            np.asarray(triangles),
+            normals,
+            uvs,
+            colors,
+            material=material or Material(),
+        )
         return _assembled(name, name, [part], np.pi, welded=False)
 
 
@@ -155,8 +165,8 @@ def load_model(path: str | PathLike[str], *, up: str = "y", allow_missing_textur
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES and not Path(path).is_dir():
         raise ModelError(path, f"unknown extension '{suffix}', expected one of {', '.join(SUFFIXES)}")
-    files = ModelFiles(path)
     try:
+        files = ModelFiles(path)
         if suffix in (".glb", ".gltf"):
             parts, crease, axes = read_gltf(files, allow_missing_textures), 0.0, _UP[up]
         else:
@@ -173,7 +183,9 @@ def load_model(path: str | PathLike[str], *, up: str = "y", allow_missing_textur
         raise
     # Whatever third-party code trips over in a broken file is that file's fault to the user: one line, no traceback.
     except Exception as error:
-        raise ModelError(files.path, f"cannot be read ({type(error).__name__}: {error}), expected {suffix}") from error
+        raise ModelError(
+            path, f"cannot be read ({type(error).__name__}: {error}), expected a valid {suffix} file"
+        ) from error
 
 
 def _mesh_loader(suffix: str):
@@ -196,13 +208,14 @@ def _assembled(where, name: str, parts: list[Part], crease: float, welded=True, 
                 raise ModelError(where, f"{part.place}: coordinates leave the range of 32-bit floats")
             by_material.setdefault(id(ready.material), []).append(ready)
     if not by_material:
-        raise ModelError(where, f"{total} triangles, none of any area, expected at least one to draw")
+        found = f"{total} triangles, none of any area" if total else "no triangles"
+        raise ModelError(where, f"{found}, expected at least one to draw")
     return Model(name, tuple(_primitive(joined(group)) for group in by_material.values()), source_hash)
 
 
 def _primitive(part: Part) -> Primitive:
     assert part.normals is not None
-    uvs = part.uvs if part.material.texture is not None else None
+    uvs = part.uvs
     return Primitive(
         np.ascontiguousarray(part.positions, np.float32),
         np.ascontiguousarray(part.normals, np.float32),

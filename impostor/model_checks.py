@@ -10,26 +10,28 @@ import io
 import re
 import struct
 import zipfile
+import zlib
 from collections import Counter
 from dataclasses import dataclass
 from math import radians
 
 import numpy as np
-from lxml import etree
+from lxml import etree  # type: ignore[attr-defined]
 
 from impostor.errors import ModelError
-from impostor.model_files import ModelFiles
+from impostor.model_files import ModelFiles, utf8
 from impostor.model_materials import warn
 from impostor.model_parts import MOST_TRIANGLES
+from impostor.model_ply import readable_ply
 
 _MOST_INSTANCES = 1_000_000
 _MOST_UNZIPPED = 2 << 30
 _CREASE, _SCAN_CREASE = radians(40), radians(80)
-_PLY_SIZES = {
-    "char": 1, "int8": 1, "uchar": 1, "uint8": 1, "short": 2, "int16": 2, "ushort": 2, "uint16": 2, "int": 4,
-    "int32": 4, "uint": 4, "uint32": 4, "float": 4, "float32": 4, "double": 8, "float64": 8, "int64": 8, "uint64": 8,
-    "float16": 2,
-}  # fmt: skip
+# The importer knows a statement by the single space behind it.
+_ODD_BLANKS = re.compile(
+    rb"^(?:[ \t]+(vt|vn|v|f|usemtl|mtllib)[ \t]+|(vt|vn|v|f|usemtl|mtllib)[ ]*\t[ \t]*)", re.MULTILINE
+)
+_DAE_DRAWN = ("{*}triangles", "{*}polylist", "{*}polygons")
 _METRES = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
 
 
@@ -70,40 +72,7 @@ def prepared(files: ModelFiles) -> Prepared:
 
 
 def _ply(files: ModelFiles) -> Prepared:
-    end = files.data.find(b"end_header")
-    if not files.data.startswith(b"ply") or end < 0:
-        raise ModelError(files.path, "header: no 'ply' ... 'end_header', expected a PLY header")
-    start = files.data.find(b"\n", end) + 1
-    lines = [line.split() for line in files.data[:end].decode("ascii", "replace").splitlines()]
-    binary = not any(line[:2] == ["format", "ascii"] for line in lines)
-    elements = _ply_elements(files, lines, binary)
-    for name in ("vertex", "face"):
-        if name not in elements:
-            raise ModelError(files.path, f"header: no element '{name}', expected a mesh of vertices and faces")
-    least, left = sum(count * size for count, size in elements.values()), len(files.data) - start
-    if least > left:
-        claims = ", ".join(f"{count} {name}" for name, (count, _) in elements.items())
-        raise ModelError(files.path, f"header: {claims} need {least} bytes at least, file holds {left}: truncated")
-    return Prepared(files.data, crease=_SCAN_CREASE)
-
-
-def _ply_elements(files: ModelFiles, lines: list[list[str]], binary: bool) -> dict[str, tuple[int, int]]:
-    """Count, and least size of one record in bytes, of each element."""
-    elements: dict[str, tuple[int, int]] = {}
-    name = ""
-    for line in lines:
-        if line[:1] == ["element"] and len(line) == 3 and line[2].isdigit():
-            name = line[1]
-            elements[name] = (int(line[2]), 0)
-        elif line[:1] == ["property"] and name and len(line) >= 3:
-            kind = line[2] if line[1] == "list" else line[1]
-            if kind not in _PLY_SIZES:
-                raise ModelError(files.path, f"header: property type '{kind}', expected one of {', '.join(_PLY_SIZES)}")
-            count, size = elements[name]
-            elements[name] = (count, size + (_PLY_SIZES[kind] if binary else 2))
-        elif line[:1] in (["element"], ["property"]):
-            raise ModelError(files.path, f"header: '{' '.join(line)}', expected an element with a count, or a property")
-    return elements
+    return Prepared(readable_ply(files), crease=_SCAN_CREASE)
 
 
 def _stl(files: ModelFiles) -> Prepared:
@@ -118,11 +87,11 @@ def _stl(files: ModelFiles) -> Prepared:
     lower = data.lower()
     if b"endsolid" not in lower:
         raise ModelError(files.path, "no 'endsolid', expected a whole ASCII or binary STL")
-    return Prepared(data, triangles=lower.count(b"endfacet"))
+    return Prepared(utf8(data), triangles=lower.count(b"endfacet"))
 
 
 def _off(files: ModelFiles) -> Prepared:
-    text = re.sub(rb"#[^\n]*", b"", files.data)
+    text = re.sub(rb"#[^\n]*", b"", utf8(files.data))
     match = re.match(rb"\s*((?:ST)?C?N?4?n?)OFF\b(.*)", text, re.DOTALL)
     if match is None or b"4" in match[1] or b"n" in match[1]:
         raise ModelError(files.path, f"begins with {files.data[:12]!r}, expected OFF")
@@ -141,9 +110,11 @@ def _off(files: ModelFiles) -> Prepared:
 
 
 def _obj(files: ModelFiles) -> Prepared:
-    data = files.data
-    if b"\0" in data[:4096]:
+    if b"\0" in files.data[:4096]:
         raise ModelError(files.path, "holds binary data, expected an OBJ text")
+    data = utf8(files.data)
+    if _ODD_BLANKS.search(data):
+        data = _ODD_BLANKS.sub(rb"\1\2 ", data)
     if short := re.search(rb"^f[ \t]+\S+(?:[ \t]+\S+)?[ \t]*\r?$", data, re.MULTILINE):
         raise ModelError(files.path, f"line {_line(data, short)}: '{_text(short)}' has fewer than 3 corners")
     if zero := re.search(rb"^f[^\n#]*[ \t/]0+(?:[/ \t\r\n]|\Z)[^\n]*", data, re.MULTILINE):
@@ -209,19 +180,19 @@ def _three_mf(files: ModelFiles) -> Prepared:
             model = archive.read(names[0])
             other_models = [name for name in archive.namelist() if name.lower().endswith(".model") and name != names[0]]
             others = [archive.read(name) for name in other_models]
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError) as error:
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, OSError, ValueError) as error:
         raise ModelError(files.path, f"not a whole ZIP archive ({error}), expected a 3MF package") from error
     root = _xml(files, model)
-    _check_3mf_instances(files, root, sum(other.count(b"triangle ") for other in others))
+    total = _check_3mf_instances(files, root, sum(other.count(b"triangle ") for other in others))
     if any(b"colorgroup" in part or b"basematerials" in part or b"texture2d" in part for part in (model, *others)):
         warn(files, "colours and textures of 3MF are not read, drawn grey")
     unit = root.get("unit", "millimeter")
     if unit not in _METRES:
         raise ModelError(files.path, f"unit '{unit}', expected one of {', '.join(_METRES)}")
-    return Prepared(files.data, _METRES[unit], "z")
+    return Prepared(files.data, _METRES[unit], "z", triangles=None if others else total)
 
 
-def _check_3mf_instances(files: ModelFiles, root: etree._Element, elsewhere: int) -> None:
+def _check_3mf_instances(files: ModelFiles, root: etree._Element, elsewhere: int) -> int:
     own, children = {}, {}
     for element in root.iter("{*}object"):
         name = element.get("id", "")
@@ -233,11 +204,11 @@ def _check_3mf_instances(files: ModelFiles, root: etree._Element, elsewhere: int
     for name in {*items, *(child for group in children.values() for child in group)} - set(own):
         if not elsewhere:
             raise ModelError(files.path, f"object '{name}' is used but not there, expected one of {len(own)} objects")
-    _check_instances(files, children, own, items)
+    return _check_instances(files, children, own, items)
 
 
-def _check_instances(files: ModelFiles, children: dict, own: dict, roots: list) -> None:
-    """Refuse loops, and instances of instances that unroll beyond what can be drawn."""
+def _check_instances(files: ModelFiles, children: dict, own: dict, roots: list) -> int:
+    """Triangles with all instances; loops, and instances of instances beyond what can be drawn, are refused."""
     totals: dict = {}
     open_names: set = set()
 
@@ -256,6 +227,7 @@ def _check_instances(files: ModelFiles, children: dict, own: dict, roots: list) 
     if instances > _MOST_INSTANCES or triangles > MOST_TRIANGLES:
         most = f"expected at most {_MOST_INSTANCES} and {MOST_TRIANGLES}"
         raise ModelError(files.path, f"unrolls to {instances} instances and {triangles} triangles, {most}")
+    return triangles
 
 
 def _dae(files: ModelFiles) -> Prepared:
@@ -266,13 +238,27 @@ def _dae(files: ModelFiles) -> Prepared:
         raise ModelError(files.path, "holds skinned meshes (instance_controller), expected meshes without skins")
     if any(next(root.iter("{*}" + name), None) is not None for name in ("lines", "linestrips")):
         warn(files, "lines, not drawn")
-    nodes = {node.get("id", str(index)): node for index, node in enumerate(root.iter("{*}node"))}
-    links = {name: [link.get("url", "")[1:] for link in node.iter("{*}instance_node")] for name, node in nodes.items()}
-    _check_instances(files, links, {}, list(links))
+    if root.find("{*}scene/{*}instance_visual_scene") is None:
+        raise ModelError(files.path, "no <scene> with an <instance_visual_scene>, expected one")
+    _check_dae_instances(files, root)
     unit, up = root.find("{*}asset/{*}unit"), root.findtext("{*}asset/{*}up_axis", "Y_UP").strip()
     if up not in ("X_UP", "Y_UP", "Z_UP"):
         raise ModelError(files.path, f"up_axis '{up}', expected X_UP, Y_UP or Z_UP")
     return Prepared(files.data, _dae_metres(files, unit), up[0].lower())
+
+
+def _check_dae_instances(files: ModelFiles, root: etree._Element) -> None:
+    counts = {
+        geometry.get("id"): sum(int(drawn.get("count", 0)) for drawn in geometry.iter(*_DAE_DRAWN))
+        for geometry in root.iter("{*}geometry")
+    }
+    names = {node: node.get("id") or f"node {index}" for index, node in enumerate(root.iter("{*}node"))}
+    children, own = {}, {}
+    for node, name in names.items():
+        children[name] = [names[child] for child in node.iterchildren("{*}node")]
+        children[name] += [link.get("url", "")[1:] for link in node.iterchildren("{*}instance_node")]
+        own[name] = sum(counts.get(link.get("url", "")[1:], 0) for link in node.iterchildren("{*}instance_geometry"))
+    _check_instances(files, children, own, [names[n] for n in root.iterfind("{*}library_visual_scenes/*/{*}node")])
 
 
 def _dae_metres(files: ModelFiles, unit: etree._Element | None) -> float:

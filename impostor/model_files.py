@@ -115,6 +115,15 @@ class ModelFiles:
         return path
 
 
+def utf8(data: bytes) -> bytes:
+    """Text as UTF-8 without a byte order mark; what is not UTF-8 is taken as Latin-1."""
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("latin-1").encode("utf-8")
+    return data.removeprefix(b"\xef\xbb\xbf")
+
+
 def _reason(error: OSError) -> str:
     if isinstance(error, FileNotFoundError):
         return "is missing"

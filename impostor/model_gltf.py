@@ -238,7 +238,12 @@ class Gltf:
         except Exception as error:
             raise self.fail(f"{place}: Draco data cannot be decoded ({error!r})") from error
         for name, index in primitive.attributes.items():
-            if name in arrays and self.item("accessors", index, place).normalized:
+            if name not in arrays:
+                continue
+            accessor = self.item("accessors", index, place)
+            if len(arrays[name]) != accessor.count:
+                raise self.fail(f"{place}.{name}: Draco data holds {len(arrays[name])}, expected {accessor.count}")
+            if accessor.normalized:
                 arrays[name] = _normalised(arrays[name])
         return arrays
 

@@ -86,7 +86,7 @@ class _SceneReader:
         self.document = gltf.document
         self.allow_missing_textures = allow_missing_textures
         self.surfaces: dict[int | None, _Surface] = {
-            None: _Surface(Material(base_color=(1.0,) * 4, double_sided=False))
+            None: _Surface(Material(base_color=(1.0, 1.0, 1.0, 1.0), double_sided=False))
         }
         self.without_texture: dict[int, Material] = {}
         self._check_extensions()
@@ -117,6 +117,10 @@ class _SceneReader:
                 self._check_total(total)
         if other_modes:
             warn(self.gltf.files, f"{other_modes} primitives of points or lines, not drawn")
+        if not shown:
+            raise self.gltf.fail(
+                f"the scene shows none of its {len(self.document.meshes)} meshes, expected at least one"
+            )
         return parts
 
     def _check_total(self, total: int) -> None:

@@ -8,6 +8,7 @@ import re
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,8 @@ from impostor.model_parts import Part
 
 _GREY = (0.8, 0.8, 0.8, 1.0)
 _WHITE = (1.0, 1.0, 1.0, 1.0)
+# Otherwise broken references are passed over, and parts of one name replace each other.
+_LOADER_OPTIONS = {".dae": {"ignore_broken": False}, ".3mf": {"postprocess": False}}
 
 
 def imported_parts(files: ModelFiles, source: Prepared, loader: Callable, allow_missing: bool) -> list[Part]:
@@ -51,7 +54,8 @@ def imported_parts(files: ModelFiles, source: Prepared, loader: Callable, allow_
     resolver = _Resolver(files, None if materials is None else list(materials), allow_missing)
     try:
         with _quiet():
-            loaded = loader(io.BytesIO(source.data), file_type=files.suffix[1:], resolver=resolver, ignore_broken=False)
+            options = _LOADER_OPTIONS.get(files.suffix, {})
+            loaded = loader(io.BytesIO(source.data), file_type=files.suffix[1:], resolver=resolver, **options)
     except IndexError as error:
         problem = obj_index_problem(source.data) if materials is not None else None
         raise ModelError(files.path, problem or f"an index is out of range ({error})") from error
@@ -60,11 +64,14 @@ def imported_parts(files: ModelFiles, source: Prepared, loader: Callable, allow_
     if resolver.error is not None:
         raise resolver.error
     parts = _Converter(files, materials).parts(loaded)
-    found = sum(len(part.triangles) for part in parts)
+    found = sum(len(part.triangles) * len(part.worlds) for part in parts)
     if source.triangles is not None and found != source.triangles:
         raise ModelError(files.path, f"{found} whole triangles, expected {source.triangles}")
-    if materials is not None and any(part.uvs is None and part.material.texture is not None for part in parts):
-        warn(files, f"texture not drawn: {obj_index_problem(source.data) or 'faces lack texture coordinates'}")
+    for part in parts:
+        if part.uvs is None and part.material.texture is not None:
+            problem = obj_index_problem(source.data) if materials is not None else None
+            warn(files, f"{part.place}: texture not drawn, {problem or 'faces lack texture coordinates'}")
+            part.material = replace(part.material, texture=None)
     return parts
 
 
@@ -105,13 +112,15 @@ class _Resolver:
 def _quiet() -> Iterator[None]:
     """No log lines or warnings of the importer on the user's terminal."""
     logger = logging.getLogger("trimesh")
-    disabled, logger.disabled = logger.disabled, True
+    level = logger.level
+    # A disabled logger would still pass on what its children log.
+    logger.setLevel(logging.CRITICAL + 1)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             yield
     finally:
-        logger.disabled = disabled
+        logger.setLevel(level)
 
 
 def _obj_materials(files: ModelFiles, data: bytes, allow_missing: bool) -> dict[str, Material]:

@@ -11,7 +11,7 @@ from PIL import Image
 from scipy.ndimage import distance_transform_edt
 
 from impostor.errors import ModelError, ModelWarning
-from impostor.model_files import ModelFiles
+from impostor.model_files import ModelFiles, utf8
 
 LARGEST_TEXTURE = 16384
 _KTX2_MAGIC = b"\xabKTX 20\xbb"
@@ -171,7 +171,7 @@ def read_mtl(files: ModelFiles, reference: str, allow_missing: bool) -> dict[str
     place = f"mtllib '{reference}'"
     statements: dict[str, dict[str, str]] = {}
     current: dict[str, str] = {}
-    text = files.read(reference, place).decode("utf-8", "replace")
+    text = utf8(files.read(reference, place)).decode()
     for line in text.replace("\\\n", " ").splitlines():
         key, _, value = line.strip().replace("\t", " ").partition(" ")
         if key.lower() == "newmtl":
@@ -224,7 +224,7 @@ def _mtl_texture(files: ModelFiles, place: str, lines: dict[str, str], allow_mis
     if color is None:
         color = np.full((*alpha.shape, 4), 255, np.uint8)
     if alpha.shape != color.shape[:2]:
-        size = (color.shape[1], color.shape[0])
+        size = Image.fromarray(color).size
         alpha = np.asarray(Image.fromarray(alpha).resize(size, Image.Resampling.BILINEAR))
     return np.dstack([color[..., :3], alpha])
 

@@ -17,9 +17,15 @@ def weld(positions: np.ndarray) -> np.ndarray:
     Returns
     -------
     ndarray, (N,) int64
-        Vertices at exactly the same position share a number, 0 .. count - 1.
+        Vertices at the same position share a number, 0 .. count - 1.
+
+    Notes
+    -----
+    Positions are the same when they round to the same point of a grid of 2**-22 of the largest coordinate, about
+    the step of a float there: exporters write the last point of a circle by another sum than its first.
     """
-    bits = (positions.astype(np.float32) + np.float32(0.0)).view(np.uint32).astype(np.uint64)
+    step = float(np.abs(positions).max(initial=0.0)) * 2.0**-22 or 1.0
+    bits = np.rint(positions / step).astype(np.int64).view(np.uint64)
     multipliers = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
     key = (bits * multipliers).sum(axis=1, dtype=np.uint64)
     key ^= key >> np.uint64(29)
@@ -115,9 +121,10 @@ def _split(
     _, first, inverse = np.unique(packed, return_index=True, return_inverse=True)
     split = triangles.reshape(-1).copy()
     split[corners] = len(normals) + inverse
-    used, renumbered = np.unique(split, return_inverse=True)
+    used = np.zeros(len(normals) + len(first), bool)
+    used[split] = True
     source = np.concatenate([np.arange(len(normals)), old[first]])[used]
-    return np.concatenate([normals, own[first]])[used], renumbered.reshape(-1, 3), source
+    return np.concatenate([normals, own[first]])[used], (np.cumsum(used) - 1)[split].reshape(-1, 3), source
 
 
 def repaired_normals(normals: np.ndarray, positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -64,6 +64,8 @@ def checked(where, part: Part) -> Part:
         array = getattr(part, name)
         if array is not None and array.shape != (count, width):
             raise ModelError(where, f"{part.place}: {name} have shape {array.shape}, expected {(count, width)}")
+    if part.colors is not None and part.colors.dtype != np.uint8:
+        raise ModelError(where, f"{part.place}: colors are {part.colors.dtype}, expected uint8")
     _check_indices(where, part, count)
     _check_finite(where, part)
     return part
@@ -99,6 +101,9 @@ def finished_part(part: Part, crease: float, welded: bool = True) -> Part | None
         None when no triangle of any area is left.
     """
     part = _expanded(part)
+    _drop_unused(part)
+    if welded and _is_soup(part):
+        _merge_vertices(part)
     keep = (face_vectors(part.positions, part.triangles) != 0).any(axis=1)
     if not keep.all():
         part.triangles = part.triangles[keep]
@@ -106,8 +111,6 @@ def finished_part(part: Part, crease: float, welded: bool = True) -> Part | None
     if not len(part.triangles):
         return None
     if part.normals is None:
-        if welded and part.uvs is None and part.colors is None and part.face_colors is None:
-            _merge_vertices(part)
         normals, part.triangles, source = computed_normals(part.positions, part.triangles, crease, welded)
         _take(part, source)
         part.normals = normals
@@ -130,7 +133,7 @@ def joined(parts: list[Part]) -> Part:
     offsets = np.cumsum([0, *(len(part.positions) for part in parts[:-1])])
     triangles = [part.triangles + offset for part, offset in zip(parts, offsets, strict=True)]
     has_colors = any(part.colors is not None for part in parts)
-    has_uvs = material.texture is not None and all(part.uvs is not None for part in parts)
+    has_uvs = all(part.uvs is not None for part in parts)
     white = [np.full((len(part.positions), 4), 255, np.uint8) if part.colors is None else part.colors for part in parts]
     return Part(
         parts[0].place,
@@ -184,6 +187,12 @@ def _wound(triangles: np.ndarray, world: np.ndarray) -> np.ndarray:
 
 def _tiled(array: np.ndarray | None, instances: int) -> np.ndarray | None:
     return array if array is None or instances == 1 else np.tile(array, (instances, 1))
+
+
+def _is_soup(part: Part) -> bool:
+    """Whether no two triangles share a vertex and vertices hold positions alone, as in STL."""
+    plain = all(array is None for array in (part.normals, part.uvs, part.colors, part.face_colors))
+    return plain and 0 < len(part.positions) == part.triangles.size
 
 
 def _merge_vertices(part: Part) -> None:

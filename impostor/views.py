@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -87,6 +88,9 @@ class View:
         Lowest and highest coordinate along back, relative to the centre, that the depth layer spans.
     distance : float
         From the centre to the eye; infinite for an orthographic camera.
+    plane : tuple of float
+        Offset and slopes (to the right, up) of the plane z = offset + slope . (x, y) that lies nearest to the surface
+        this camera sees. A quad in it stays true farther away from the camera than one through the centre.
     """
 
     basis: NDArray[np.floating[Any]]
@@ -94,6 +98,7 @@ class View:
     radius: float
     depth_range: tuple[float, float]
     distance: float = np.inf
+    plane: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def clip_from_model(self) -> NDArray[np.float64]:
         """The camera's projection: (4, 4) float64, OpenGL clip space, depth range filled exactly."""
@@ -142,6 +147,8 @@ class Views:
     depth_range : ndarray, (V, 2) float64
     distance : float
         Shared by all views; infinite for orthographic ones.
+    plane : ndarray, (V, 3) float64
+        Offset and slopes of the plane nearest to what is seen, as `View.plane`; through the centre if not given.
     """
 
     basis: NDArray[np.float64]
@@ -149,9 +156,17 @@ class Views:
     radius: NDArray[np.float64]
     depth_range: NDArray[np.float64]
     distance: float = np.inf
+    plane: NDArray[np.float64] = None  # type: ignore[assignment]
+
+    def __post_init__(self):
+        if self.plane is None:
+            object.__setattr__(self, "plane", np.zeros((len(self.basis), 3)))
 
     def __len__(self) -> int:
         return len(self.basis)
+
+    def __iter__(self) -> Iterator[View]:
+        return (self[index] for index in range(len(self)))
 
     def __getitem__(self, index: int) -> View:
         low, high = self.depth_range[index]
@@ -161,6 +176,7 @@ class Views:
             float(self.radius[index]),
             (float(low), float(high)),
             self.distance,
+            tuple(self.plane[index].tolist()),
         )
 
     def nearest(self, toward_eye: ArrayLike) -> NDArray[np.intp]:

@@ -105,7 +105,9 @@ class CallerState:
 
     def __init__(self, ctx: moderngl.Context):
         self._ctx = ctx
-        self._bound = ctx.fbo
+        # A framebuffer that the caller has released stays here as an empty shell.
+        released = ctx.fbo is None or isinstance(ctx.fbo.mglo, moderngl.InvalidObject)
+        self._bound = None if released else ctx.fbo
         self._switches = {name: _enabled(name) for name in _SWITCHES}
         self.viewport = tuple(_integers(_VIEWPORT, 4))
         self._scissor = _integers(_SCISSOR_BOX, 4)

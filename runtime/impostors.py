@@ -25,7 +25,7 @@ QUAD_DTYPE = np.dtype(
         ("toward_eye", "f4", (3,)),
         ("rectangle", "f4", (4,)),
         ("place", "f4", (3,)),
-        ("depth_range", "f4", (2,)),
+        ("depth", "f4", (4,)),
     ]
 )
 ALPHA_CUTOFF = 1 / 32
@@ -66,7 +66,7 @@ class ImpostorPass:
         names = QUAD_DTYPE.names or ()
         self._array = ctx.vertex_array(
             self._program,
-            [(self._corners, "2f", "corner"), (self._quads.buffer, "3f 3f 3f 3f 4f 3f 2f/i", *names)],
+            [(self._corners, "2f", "corner"), (self._quads.buffer, "3f 3f 3f 3f 4f 3f 4f/i", *names)],
         )
         self._lit: dict[object, int] = {}
         self._normals_for: NDArray[np.float64] | None = None
@@ -208,12 +208,12 @@ class ImpostorPass:
 def _seen_quads(batch: Batch, viewer: Viewer) -> Quads:
     quads = quads_toward(batch.instances, viewer.eye)
     radius = batch.instances.fan.views.radius.max() * np.sqrt(2) * quads.scale
-    return quads.take(viewer.sees(quads.center, radius))
+    return quads.take(viewer.sees(quads.origin, radius))
 
 
 def _levels(batch: Batch, quads: Quads, viewer: Viewer) -> NDArray[np.intp]:
     """The coarsest mip level (N,) whose tile is not magnified by more than MAGNIFICATION on screen."""
-    side = 2 * batch.instances.fan.views.radius[quads.view] * quads.scale * viewer.pixels_per_metre(quads.center)
+    side = 2 * batch.instances.fan.views.radius[quads.view] * quads.scale * viewer.pixels_per_metre(quads.origin)
     ratio = batch.textures.size * MAGNIFICATION / np.maximum(side, 1e-3)
     return np.clip(np.floor(np.log2(ratio)), 0, batch.textures.levels - 1).astype(np.intp)
 
@@ -221,9 +221,8 @@ def _levels(batch: Batch, quads: Quads, viewer: Viewer) -> NDArray[np.intp]:
 def _records(batch: Batch, quads: Quads, places: NDArray[np.int32]) -> NDArray[np.void]:
     fan = batch.instances.fan
     records = np.zeros(len(quads), QUAD_DTYPE)
-    reach = (quads.scale * fan.views.radius[quads.view])[:, None]
-    records["center"] = quads.center
-    records["right"], records["up"] = quads.basis[:, 0] * reach, quads.basis[:, 1] * reach
+    reach = fan.views.radius[quads.view][:, None]
+    records["center"], records["right"], records["up"] = quads.center, quads.right * reach, quads.up * reach
     # Depth along the view's back counts toward the eye as far as the two agree.
     along = np.einsum("ni,ni->n", quads.basis[:, 2], quads.toward_eye)
     records["toward_eye"] = quads.toward_eye * along[:, None]
@@ -234,8 +233,9 @@ def _records(batch: Batch, quads: Quads, places: NDArray[np.int32]) -> NDArray[n
     records["rectangle"] = np.clip(edges, 0, fan.size) * (2 / fan.size) - 1
     records["place"] = places
     low, high = fan.views.depth_range[quads.view].T
-    records["depth_range"][:, 0] = low * quads.scale
-    records["depth_range"][:, 1] = (high - low) * quads.scale
+    offset, slope_right, slope_up = fan.views.plane[quads.view].T
+    depth = np.stack([low - offset, high - low, -slope_right * reach[:, 0], -slope_up * reach[:, 0]], axis=-1)
+    records["depth"] = depth * quads.scale[:, None]
     return records
 
 

@@ -155,8 +155,10 @@ class Quads:
         The nearest view of the fan.
     basis : ndarray, (N, 3, 3) float64
         That view's right, up and back as turned in the world; orthonormal.
-    center : ndarray, (N, 3) float64
-        World position of the middle of the tile.
+    origin : ndarray, (N, 3) float64
+        World position of the view's centre.
+    center, right, up : ndarray, (N, 3) float64
+        The quad: tile coordinates (x, y), in the view's metres, are drawn at `center + x right + y up`.
     toward_eye : ndarray, (N, 3) float64
         Unit vectors.
     scale : ndarray, (N,) float64
@@ -165,7 +167,10 @@ class Quads:
     index: NDArray[np.intp]
     view: NDArray[np.intp]
     basis: NDArray[np.float64]
+    origin: NDArray[np.float64]
     center: NDArray[np.float64]
+    right: NDArray[np.float64]
+    up: NDArray[np.float64]
     toward_eye: NDArray[np.float64]
     scale: NDArray[np.float64]
 
@@ -177,32 +182,57 @@ class Quads:
         return Quads(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
 
-def quads_toward(instances: Instances, eye: NDArray[np.float64], index: NDArray[np.intp] | None = None) -> Quads:
-    """The nearest view of every instance, set up in the world (the paper's figure 2).
-
-    The quad keeps the plane its view was baked in, turned with the instance: what lies in that plane through the
-    object's middle is then drawn where the mesh would draw it, from any side.
+def nearest_views(
+    instances: Instances, eye: NDArray[np.float64], index: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """The fan view nearest to an eye, or to a light, of each instance.
 
     Parameters
     ----------
     instances : Instances
     eye : ndarray, (4,) float64
-        Homogeneous, `Viewer.eye`; a light's direction with w = 0 gives the views nearest to the light.
-    index : ndarray, (N,) intp, optional
-        Which instances; all visible ones if not given.
+        Homogeneous, `Viewer.eye`; (x, y, z, 0) for a direction.
+    index : ndarray, (N,) intp
+        Which instances.
+
+    Returns
+    -------
+    view : ndarray, (N,) intp
+    toward : ndarray, (N, 3) float64
+        Unit vectors from the instance toward the eye, world space.
+    """
+    rotation = rotation_about_y(instances.yaws[index])
+    middle = instances.fan.views.center.mean(axis=0)
+    where = instances.positions[index] + instances.scales[index, None] * (rotation @ middle)
+    toward = eye[:3] - eye[3] * where
+    toward /= np.maximum(np.linalg.norm(toward, axis=-1, keepdims=True), 1e-12)
+    return instances.fan.views.nearest(np.einsum("nji,nj->ni", rotation, toward)), toward
+
+
+def quads_toward(instances: Instances, eye: NDArray[np.float64]) -> Quads:
+    """The nearest view of every visible instance, set up in the world (the paper's figure 2).
+
+    The quad lies in the plane nearest to the surface its view shows, turned with the instance: seen from the view's
+    own camera that makes no difference, and from beside it what lies in the plane is drawn where the mesh would be.
+
+    Parameters
+    ----------
+    instances : Instances
+    eye : ndarray, (4,) float64
+        Homogeneous, `Viewer.eye`.
 
     Returns
     -------
     Quads
     """
-    views = instances.fan.views
-    index = np.flatnonzero(instances.visible) if index is None else index
-    scale, rotation = instances.scales[index], rotation_about_y(instances.yaws[index])
-    middle = views.center.mean(axis=0)
-    where = instances.positions[index] + scale[:, None] * (rotation @ middle)
-    toward = eye[:3] - eye[3] * where
-    toward /= np.maximum(np.linalg.norm(toward, axis=-1, keepdims=True), 1e-12)
-    view = views.nearest(np.einsum("nji,nj->ni", rotation, toward))
-    center = instances.positions[index] + scale[:, None] * np.einsum("nij,nj->ni", rotation, views.center[view])
+    views, index = instances.fan.views, np.flatnonzero(instances.visible)
+    view, toward = nearest_views(instances, eye, index)
+    rotation, scale = rotation_about_y(instances.yaws[index]), instances.scales[index]
+    origin = instances.positions[index] + scale[:, None] * np.einsum("nij,nj->ni", rotation, views.center[view])
     basis = np.einsum("nij,nkj->nki", rotation, views.basis[view])
-    return Quads(index, view, basis, center, toward, scale)
+    offset, slope_right, slope_up = views.plane[view].T[..., None] * scale[:, None]
+    right, up, back = basis[:, 0] * scale[:, None], basis[:, 1] * scale[:, None], basis[:, 2]
+    # A perspective camera's picture shrinks with the distance of the plane it falls on.
+    spread = 1 - views.plane[view, :1] / views.distance
+    quad = origin + offset * back, spread * right + slope_right * back, spread * up + slope_up * back
+    return Quads(index, view, basis, origin, *quad, toward, scale)

@@ -39,10 +39,14 @@ class Offscreen:
         if min(width, height) < 1:
             raise SettingsError("picture", f"{width}x{height} pixels; expected at least 1x1")
         check_texture_size(ctx, "picture", width * samples, height * samples)
+        self._ctx = ctx
         self.width, self.height, self._level = width, height, samples.bit_length() - 1
         size = (width * samples, height * samples)
         try:
             self._color = ctx.texture(size, 4)
+            if self._level:
+                # Mip levels allotted after the framebuffer is made leave it drawing into the texture's old storage.
+                self._color.build_mipmaps(max_level=self._level)
             self._depth = ctx.depth_texture(size)
             self.framebuffer = ctx.framebuffer([self._color], self._depth)
         except moderngl.Error as problem:
@@ -69,6 +73,8 @@ class Offscreen:
 
     def release(self) -> None:
         """Free the buffers."""
+        if self._ctx.fbo is self.framebuffer and self._ctx.screen is not None:
+            self._ctx.screen.use()
         for resource in (self.framebuffer, self._color, self._depth):
             resource.release()
 

@@ -134,8 +134,9 @@ class RelightPass:
     def release(self) -> None:
         """Free everything this pass made."""
         for array in self._arrays.values():
+            program = array.program
             array.release()
-            array.program.release()
+            program.release()
         for resource in (self._tiles, self._corners):
             resource.release()
 

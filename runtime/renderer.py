@@ -21,7 +21,8 @@ from runtime.lights import LightTable
 from runtime.meshes import MeshBuffers, MeshInstance, MeshPass
 from runtime.shadows import ShadowPass
 
-DEFAULT_LIGHTS = (DirectionalLight.from_angles(40, 45),)
+DEFAULT_LIGHTS = (DirectionalLight.from_angles(40, 45, (0.75, 0.75, 0.75)),)
+DEFAULT_AMBIENT = 0.25
 
 
 class ImpostorRenderer:
@@ -55,7 +56,7 @@ class ImpostorRenderer:
     def __init__(self, ctx: moderngl.Context, cache_side: int = 4096):
         self._ctx = ctx
         self.lights: Sequence[DirectionalLight] = DEFAULT_LIGHTS
-        self.ambient: ArrayLike = 0.25
+        self.ambient: ArrayLike = DEFAULT_AMBIENT
         with preserved_state(ctx):
             self._impostors = ImpostorPass(ctx, cache_side)
             self._mesh_pass, self._ground_pass, self._shadows = MeshPass(ctx), GroundPass(ctx), ShadowPass(ctx)

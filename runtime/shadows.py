@@ -19,7 +19,7 @@ from impostor.shadow_projection import Ground, casts_shadow, ground_from_sight, 
 from impostor.strips import silhouette_strips
 from runtime.gl_state import CallerState, set_state
 from runtime.gpu import load_program, set_uniforms
-from runtime.instances import Instances, Quads, Viewer, quads_toward
+from runtime.instances import Instances, Quads, Viewer, nearest_views, quads_toward
 from runtime.meshes import MeshInstance, draw_parts
 from runtime.relight import InstanceBuffer
 
@@ -149,9 +149,9 @@ class ShadowPass:
 
     def _mark_fan(self, instances: Instances, viewer: Viewer, light: DirectionalLight, ground: Ground) -> None:
         seen = quads_toward(instances, viewer.eye)
-        light_views = quads_toward(instances, np.append(light.toward, 0.0), seen.index).view
         if not len(seen):
             return
+        light_views, _ = nearest_views(instances, np.append(light.toward, 0.0), seen.index)
         order = np.argsort(light_views, kind="stable")
         casters = _casters(instances, seen.take(order), viewer, ground)
         views, first, count = np.unique(light_views[order], return_index=True, return_counts=True)
@@ -230,7 +230,7 @@ def _casters(instances: Instances, seen: Quads, viewer: Viewer, ground: Ground) 
     casters["turn"] = np.stack([np.cos(yaws), np.sin(yaws)], axis=-1)
     plane_from_world = np.zeros((len(seen), 3, 4))
     plane_from_world[:, :, :3] = seen.basis
-    plane_from_world[:, :, 3] = -np.einsum("nij,nj->ni", seen.basis, seen.center)
+    plane_from_world[:, :, 3] = -np.einsum("nij,nj->ni", seen.basis, seen.origin)
     if np.isfinite(views.distance):
         eye_distance = views.distance * seen.scale
         plane_from_world[:, :2] *= eye_distance[:, None, None]
@@ -239,7 +239,9 @@ def _casters(instances: Instances, seen: Quads, viewer: Viewer, ground: Ground) 
     else:
         plane_from_world[:, 2] = [0, 0, 0, 1]
     world_from_plane = np.zeros((len(seen), 4, 3))
-    world_from_plane[:, :3] = np.stack([seen.basis[:, 0], seen.basis[:, 1], seen.center], axis=-1)
+    # Plane coordinates are world metres here, the quad's axes are for metres of the view.
+    right, up = seen.right / seen.scale[:, None], seen.up / seen.scale[:, None]
+    world_from_plane[:, :3] = np.stack([right, up, seen.center], axis=-1)
     world_from_plane[:, 3, 2] = 1
     casters["rows"] = ground_from_sight(viewer.eye, ground) @ world_from_plane @ plane_from_world
     return casters

@@ -63,10 +63,8 @@ def walls() -> Mesh:
         sides.append(wall("side", outline, (0, 0, -sign), (x, 0, sign * depth)))
     gable = [(low, 0, WING_FRONT), (high, 0, WING_FRONT), (high, EAVES, WING_FRONT), (WING_MIDDLE, WING_RIDGE, WING_FRONT), (low, EAVES, WING_FRONT)]
     wing = wall("wing", gable, (1, 0, 0), (low, 0, WING_FRONT))
-    cheek = WING_FRONT - depth
     right = wall("cheek", [(high, 0, WING_FRONT), (high, 0, depth), (high, EAVES, depth), (high, EAVES, WING_FRONT)], (0, 0, -1), (high, 0, WING_FRONT))
     left = wall("cheek", [(low, 0, depth), (low, 0, WING_FRONT), (low, EAVES, WING_FRONT), (low, EAVES, depth)], (0, 0, 1), (low, 0, depth))
-    assert cheek > 0
     return merge([front, back, *sides, wing, left, right])
 
 
@@ -200,7 +198,7 @@ def make_house(folder: Path) -> None:
     """Write house.glb."""
     glb = Glb("house")
     painted = glb.add_material("painted", texture=glb.add_texture(paint_atlas(), 86), roughness=0.95)
-    house = glb.add_node("house")
+    house = glb.add_node("house", at=(0, 0, -0.631))
     glb.add_node("walls", glb.add_mesh("walls", [(walls(), painted)]), house)
     glb.add_node("roof", glb.add_mesh("roof", [(merge([roof(), barge_boards()]), painted)]), house)
     glb.add_node("chimney", glb.add_mesh("chimney", [(chimney(), painted)]), house, at=(-2.9, 0, 0))

@@ -218,8 +218,9 @@ def paint_atlas() -> np.ndarray:
     art["ridge"] = rgb("#8d5644") * (1 + 0.10 * noise(size["ridge"][::-1], 73, 1.0)[..., None])
     leafy = noise(size["leaves"][::-1], 75, 0.8)
     art["leaves"] = ramp(0.5 + 0.2 * leafy, ("#3c5526", "#57742f", "#7c9440"))
-    spots = noise(size["flowers"][::-1], 77, 0.9)
-    art["flowers"] = mix(ramp(0.5 + 0.2 * spots, ("#4c6a2c", "#6d8a3b")), rgb("#c4566a"), np.clip(3 * spots + 0.4, 0, 1))
+    spots = noise(size["flowers"][::-1], 77, 0.5)
+    art["flowers"] = mix(ramp(0.5 + 0.2 * spots, ("#3c5a24", "#5f7d33")), rgb("#cf5a72"), np.clip(4 * spots - 0.4, 0, 1))
+    art["flowers"] = mix(art["flowers"], rgb("#ecd9d6"), np.clip(4 * noise(size["flowers"][::-1], 78, 0.5) - 5, 0, 1))
     art["brass"] = np.broadcast_to(rgb("#b08d4a"), (*size["brass"][::-1], 3))
 
     atlas = np.broadcast_to(rgb("#948d80"), (*ATLAS[::-1], 3)).copy()

@@ -229,10 +229,10 @@ def frond_texture(size: int = 512) -> np.ndarray:
     foot, top = np.array([middle, 0.995 * big]), np.array([middle, 0.03 * big])
     half = (big - left) / 2
     twigs = [(foot, top, 1.0)]
-    for step in np.linspace(0.03, 0.93, 21):
+    for step in np.linspace(0.02, 0.95, 17):
         for side in (-1, 1):
-            at = foot + (top - foot) * (step + rng.uniform(-0.015, 0.015))
-            reach = half * 0.97 * (1 - step) ** 0.55 * rng.uniform(0.85, 1.0) * min(1.0, 0.55 + 2.2 * step)
+            at = foot + (top - foot) * (step + rng.uniform(-0.006, 0.006) + 0.012 * side)
+            reach = half * 0.97 * (1 - step) ** 0.55 * rng.uniform(0.85, 1.0) * min(1.0, 0.7 + 2.2 * step)
             lean = side * rng.uniform(0.85, 1.05)
             twigs.append((at, at + reach / abs(np.sin(lean)) * 0.96 * np.array([np.sin(lean), -np.cos(lean)]), 0.8))
     for start, end, weight in twigs:
@@ -249,7 +249,7 @@ def frond_texture(size: int = 512) -> np.ndarray:
     for index in rng.permutation(len(needles)):
         base, tip, step = needles[index]
         fresh = 0.72 + 0.40 * step + rng.normal(0, 0.10)
-        blade(canvas, base, tip, 0.0062 * big, rgb("#4d7350") * fresh * rng.uniform(0.94, 1.06, 3))
+        blade(canvas, base, tip, 0.0062 * big, rgb("#56744c") * fresh * rng.uniform(0.94, 1.06, 3))
     canvas[:, : int(left)] = np.concatenate([np.tile(rgb("#2c4a33"), (big, int(left), 1)), np.zeros((big, int(left), 1))], -1)
     image = bleed(shrink(canvas, 2))
     strip = bark(size, 31, ("#33271f", "#5f4838", "#836753", "#967b66"))[:, : int(0.145 * size)]
@@ -263,7 +263,7 @@ def frond(foot: np.ndarray, azimuth: float, length: float, width: float, rise: f
     along = np.linspace(0, 1, 5)
     outward = np.array([np.sin(azimuth), 0, np.cos(azimuth)])
     across = np.array([np.cos(azimuth), 0, -np.sin(azimuth)])
-    height = length * (rise * along - 0.62 * along**1.6 + 0.36 * along**3)
+    height = length * (rise * along - 0.66 * along**1.5 + 0.42 * along**3)
     spine = foot + length * along[:, None] * outward + height[:, None] * (0, 1, 0)
     wing = np.array([1.0, 0.0, -1.0])
     points = spine[:, None] + width / 2 * wing[:, None] * (across + (0, roll, 0))
@@ -284,16 +284,16 @@ def make_pine(folder: Path) -> None:
     trunk = branch(path, 0.005 + 0.155 * (1 - levels / height) ** 0.9, flare=True)
     trunk = replace(trunk, uvs=trunk.uvs * [BARK_WIDTH / trunk.uvs[:, 0].max(), 1.0])
     parts = []
-    count = 430
+    count = 600
     for k, t in enumerate(np.linspace(0, 1, count) ** 0.85):
         y = 1.15 + 7.2 * t
         length = (2.3 * (1 - t) ** 0.95 + 0.22) * rng.uniform(0.82, 1.08)
         foot = np.array([np.interp(y, levels, path[:, 0]), y, np.interp(y, levels, path[:, 2])])
         azimuth = k * np.pi * (3 - np.sqrt(5)) + rng.normal(0, 0.15)
-        rise = 0.08 + 0.75 * t**2 + rng.normal(0, 0.06)
-        parts.append(frond(foot, azimuth, length, length * 0.62 + 0.12, rise, rng.normal(0, 0.22)))
+        rise = 0.06 + 0.34 * t**2 + rng.normal(0, 0.06)
+        parts.append(frond(foot, azimuth, length, length * 0.46 + 0.14, rise, rng.normal(0, 0.22)))
     for azimuth in (0.0, 1.05, 2.1, 3.15, 4.2, 5.25):
-        parts.append(frond(np.array([0.03 * np.sin(8.1), 8.15, 0]), azimuth, 0.26, 0.22, 2.1, 0.0))
+        parts.append(frond(np.array([0.03 * np.sin(8.1), 8.15, 0]), azimuth, 0.20, 0.18, 2.3, 0.0))
     materials = (
         "newmtl bark\nKd 1 1 1\nmap_Kd pine.png\n\nnewmtl needles\nKd 1 1 1\nmap_Kd pine.png\nmap_d -imfchan m pine.png\n"
     )

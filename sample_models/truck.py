@@ -226,7 +226,10 @@ def make_truck(folder: Path) -> None:
     wood = glb.add_material("wood", texture=glb.add_texture(wood_texture(), 88), roughness=0.9)
 
     truck = glb.add_node("truck")
-    rails = merge([box((0.10, 0.16, 4.7), 0.02).moved(x, 0.60, -0.25) for x in (-0.40, 0.40)])
+    rails = [box((0.10, 0.16, 4.7), 0.02).moved(x, 0.60, -0.25) for x in (-0.40, 0.40)]
+    horns = [box((0.07, 0.07, 0.50), 0.015).moved(x, 0.54, 2.30) for x in (-0.40, 0.40)]
+    apron = box((0.98, 0.10, 0.40), 0.04).moved(0, 0.58, 2.20)
+    rails = merge([*rails, *horns, apron])
     tank = revolve([(0.0, -0.42), (0.16, -0.42), (0.17, -0.4), (0.17, 0.4), (0.16, 0.42), (0.0, 0.42)], 24).turned("x", 90)
     chassis = glb.add_node("chassis", glb.add_mesh("chassis", [(rails, steel), (tank.moved(0.62, 0.62, -0.62), steel)]), truck)
 
@@ -237,13 +240,11 @@ def make_truck(folder: Path) -> None:
         axle = glb.add_node(f"{name} axle", axle_bar, chassis, at=(0, WHEEL, z))
         glb.add_node(f"{name} left wheel", wheels, axle, at=(0.80, 0, 0), turn=("x", 20))
         glb.add_node(f"{name} right wheel", wheels, axle, at=(-0.80, 0, 0), turn=("y", 180))
-    glb.add_node("spare wheel", wheels, chassis, at=(0.0, 0.72, -2.38), turn=("y", 180), scale=(0.9, 0.9, 0.9))
+    glb.add_node("spare wheel", wheels, chassis, at=(0.0, 0.68, -2.14), turn=("z", -90), scale=(0.9, 0.9, 0.9))
 
     windscreen = on_skin(1.41, 1.75, (-0.60, 0.80), (0.60, 0.80), 0.012)
     seal = on_skin(1.375, 1.785, (-0.645, 0.78), (0.645, 0.78), 0.006)
     rear = on_skin(1.44, 1.72, (0.42, -0.40), (-0.42, -0.40), 0.012)
-    roof = on_skin(1.30, 1.345, (0.0, 0.85), (0.0001, 0.85), 0.0)
-    del roof
     body = glb.add_node("cab", glb.add_mesh("cab", [(cab_shell(), paint), (seal, rubber), (windscreen, glass), (rear, glass)]), truck)
     glb.add_node("hood", glb.add_mesh("hood", [(hood(), paint)]), body)
     bars = merge([box((0.62 - 0.018 * k, 0.026, 0.05), 0.01).moved(0, 0.68 + 0.055 * k, 2.305) for k in range(8)])

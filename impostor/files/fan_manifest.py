@@ -123,19 +123,30 @@ def atlas_grid(count: int) -> tuple[int, int]:
 
 def layer_shapes(size: int, columns: int, rows: int, levels: int) -> list[LayerShape]:
     """The images of a fan with tiles of `size` and `levels` levels of normals, in the order of the archive."""
-    names = ["color.png", *("normal.png" if level == 0 else f"normal_{level}.png" for level in range(levels))]
-    modes = ["rgba8", *["palette8"] * levels]
-    tiles = [size, *(max(size >> level, 1) for level in range(levels))]
-    names, modes, tiles = [*names, "depth.png", "silhouette.png"], [*modes, "gray16", "gray1"], [*tiles, size, size]
-    return [
-        LayerShape(name, mode, columns * tile, rows * tile, tile)
-        for name, mode, tile in zip(names, modes, tiles, strict=True)
+    layers = [
+        ("color.png", "rgba8", size),
+        *(
+            (f"normal_{level}.png" if level else "normal.png", "palette8", max(size >> level, 1))
+            for level in range(levels)
+        ),
+        ("depth.png", "gray16", size),
+        ("silhouette.png", "gray1", size),
     ]
+    return [LayerShape(file, mode, columns * tile, rows * tile, tile) for file, mode, tile in layers]
 
 
-def parse_manifest(
-    data: bytes, where: str | PathLike[str], error: type[ImpostorError] = FanFileError, version_only: bool = False
-) -> Manifest | None:
+def check_version(data: bytes, where: str | PathLike[str], error: type[ImpostorError] = FanFileError) -> None:
+    """Raise `error` unless these bytes begin a manifest of a version that this program reads."""
+    header = _decode(data, _Header, where, error)
+    if header.format != FORMAT:
+        raise error(where, f"manifest $.format: {header.format[:40]!r}; expected {FORMAT!r}")
+    if header.version > VERSION:
+        raise error(where, f"format version {header.version}; this program reads up to {VERSION}")
+    if header.version < 1:
+        raise error(where, f"manifest $.version: {header.version}; expected 1 to {VERSION}")
+
+
+def parse_manifest(data: bytes, where: str | PathLike[str], error: type[ImpostorError] = FanFileError) -> Manifest:
     """A manifest from its bytes, with everything checked that needs no pixel.
 
     Parameters
@@ -145,23 +156,12 @@ def parse_manifest(
         Named in the message.
     error : type
         Raised when something is wrong.
-    version_only : bool
-        Look at format and version, and no further.
 
     Returns
     -------
-    Manifest or None
-        None when only the version was asked for.
+    Manifest
     """
-    header = _decode(data, _Header, where, error)
-    if header.format != FORMAT:
-        raise error(where, f"manifest $.format: {header.format[:40]!r}; expected {FORMAT!r}")
-    if header.version > VERSION:
-        raise error(where, f"format version {header.version}; this program reads up to {VERSION}")
-    if header.version < 1:
-        raise error(where, f"manifest $.version: {header.version}; expected 1 to {VERSION}")
-    if version_only:
-        return None
+    check_version(data, where, error)
     manifest = _decode(data, Manifest, where, error)
     for problem in _problems(manifest):
         raise error(where, f"manifest {problem}")
@@ -179,9 +179,9 @@ def manifest_bytes(fields: dict[str, Any]) -> bytes:
     lines = []
     for key in sorted(fields):
         value = fields[key]
-        text = f"[\n  {',\n  '.join(map(_dumps, value))}\n ]" if isinstance(value, list) else _dumps(value)
+        text = "[\n  " + ",\n  ".join(map(_dumps, value)) + "\n ]" if isinstance(value, list) else _dumps(value)
         lines.append(f"{_dumps(key)}: {text}")
-    return f"{{\n {',\n '.join(lines)}\n}}\n".encode()
+    return ("{\n " + ",\n ".join(lines) + "\n}\n").encode()
 
 
 def _dumps(value: Any) -> str:
@@ -196,7 +196,7 @@ def _plain(value: Any) -> Any:
 
 def _decode(data: bytes, kind: type, where: str | PathLike[str], error: type[ImpostorError]) -> Any:
     try:
-        return msgspec.json.decode(data, type=kind)
+        return msgspec.json.decode(data.decode(), type=kind)  # msgspec itself looks at the UTF-8 it needs, not at all
     except msgspec.ValidationError as found:
         raise error(where, f"manifest {_readable(str(found), data)}") from None
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as found:
@@ -206,15 +206,22 @@ def _decode(data: bytes, kind: type, where: str | PathLike[str], error: type[Imp
 def _readable(message: str, data: bytes) -> str:
     """msgspec's message with the place first and the value that was found."""
     text, _, place = message.partition(" - at `")
-    place = place.rstrip("`") or "$"
-    if not text.startswith("Expected"):
-        return f"{place}: {text[:1].lower()}{text[1:]}"
-    value = msgspec.json.decode(data)
-    for key, index in re.findall(r"\.(\w+)|\[([^]]*)\]", place):
-        if index == "...":  # msgspec does not say which value of an object it was
-            break
-        value = value[key or int(index)]
-    return f"{place}: {json.dumps(value)[:60]}; {text[:1].lower()}{text[1:]}"
+    text, place = text[:1].lower() + text[1:], place.rstrip("`") or "$"
+    value = _value_at(place, data) if text.startswith("expected") else ""
+    return f"{place}: {value}; {text}" if value else f"{place}: {text}"
+
+
+def _value_at(place: str, data: bytes) -> str:
+    """The beginning of the JSON at a place like `$.views[3].radius`; nothing where that cannot be told."""
+    try:
+        value = msgspec.json.decode(data)
+        for key, index in re.findall(r"\.(\w+)|\[([^]]*)\]", place):
+            if index == "...":  # a value of an object: msgspec does not say which
+                break
+            value = value[key or int(index)]
+        return json.dumps(value)[:60]
+    except (msgspec.DecodeError, RecursionError, LookupError, TypeError, ValueError):
+        return ""  # the file has more wrong with it than what was found first
 
 
 def _problems(manifest: Manifest) -> Iterator[str]:
@@ -243,18 +250,19 @@ def _layer_problems(manifest: Manifest) -> Iterator[str]:
 
 
 def _camera_problems(views: Views) -> Iterator[str]:
-    products = views.basis @ views.basis.transpose(0, 2, 1)
-    skewed = np.abs(products - np.eye(3)).max(axis=(1, 2)) > ORTHONORMAL_TOLERANCE
-    left_handed = ~skewed & (np.linalg.det(views.basis) < 0)
+    with np.errstate(over="ignore", invalid="ignore"):  # of absurd numbers, which fail the comparison
+        products = views.basis @ views.basis.transpose(0, 2, 1)
+        orthonormal = np.abs(products - np.eye(3)).max(axis=(1, 2)) <= ORTHONORMAL_TOLERANCE
+        right_handed = np.einsum("vi,vi->v", np.cross(views.basis[:, 0], views.basis[:, 1]), views.basis[:, 2]) > 0
     low, high = views.depth_range.T
-    for index in _first(skewed):
+    for index in _first(~orthonormal):
         yield f"$.views[{index}].basis: {views.basis[index].tolist()}; expected orthonormal rows right, up, back"
-    for index in _first(left_handed):
+    for index in _first(~right_handed):
         yield f"$.views[{index}].basis: {views.basis[index].tolist()}; expected a right-handed basis"
-    for index in _first(~(low < high)):
-        yield f"$.views[{index}].depth_range: {low[index]:g}, {high[index]!r}; expected the lower one first"
+    for index in _first(low >= high):
+        yield f"$.views[{index}].depth_range: {low[index]:g}, {high[index]:g}; expected the lower one first"
     for index in _first(high >= views.distance):
-        yield f"$.distance: {views.distance!r}; expected more than $.views[{index}].depth_range[1], {high[index]!r}"
+        yield f"$.distance: {views.distance:g}; expected more than $.views[{index}].depth_range[1], {high[index]:g}"
 
 
 def _first(wrong: NDArray[np.bool_]) -> list[int]:

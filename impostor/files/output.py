@@ -113,7 +113,9 @@ def _remove_litter(final: Path) -> None:
     """
     pattern = re.compile(rf"\.impostor-\d+\.{re.escape(final.name)}")
     with os.scandir(final.parent) as entries:
-        left = [entry.path for entry in entries if pattern.fullmatch(entry.name) and entry.is_file(follow_symlinks=False)]
+        left = [
+            entry.path for entry in entries if pattern.fullmatch(entry.name) and entry.is_file(follow_symlinks=False)
+        ]
     for path in left:
         with suppress(OSError), open(path, "r+b") as held:
             if _lock(held.fileno()):

@@ -7,7 +7,8 @@ in vec2 v_texel;
 in vec2 v_plane_zw;
 flat in vec2 v_eye_zw;
 flat in vec4 v_bounds;
-flat in vec2 v_depth_range;
+in float v_depth_start;
+flat in float v_depth_span;
 uniform vec2 cache_size;
 out vec4 color;
 
@@ -15,7 +16,7 @@ void main() {
     vec2 texel = clamp(v_texel, v_bounds.xy, v_bounds.zw);
     color = textureLod(tiles, texel / cache_size, 0.0);
     if (color.a < alpha_cutoff) discard;
-    float z = v_depth_range.x + texelFetch(tile_depth, ivec2(texel), 0).r * v_depth_range.y;
+    float z = v_depth_start + texelFetch(tile_depth, ivec2(texel), 0).r * v_depth_span;
     vec2 zw = v_plane_zw + z * v_eye_zw;
     gl_FragDepth = clamp(zw.x / zw.y, -1.0, 1.0) * 0.5 + 0.5;
 }

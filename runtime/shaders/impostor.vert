@@ -8,12 +8,13 @@ in vec3 right, up;    // world, from the middle of the tile to its edge
 in vec3 toward_eye;   // world: what one metre of depth along the view's back moves the picture toward the eye
 in vec4 rectangle;    // the covered part of the tile: left, bottom, right, top in -1..1
 in vec3 place;        // x, y and side of the relit tile in the cache
-in vec2 depth_range;  // metres along back at depth 0, and from there to depth 1
+in vec4 depth;        // metres in front of the quad: at depth 0, from there to depth 1, and per unit of plane x and y
 out vec2 v_texel;
 out vec2 v_plane_zw;
 flat out vec2 v_eye_zw;
 flat out vec4 v_bounds;
-flat out vec2 v_depth_range;
+out float v_depth_start;
+flat out float v_depth_span;
 
 void main() {
     vec2 plane = mix(rectangle.xy, rectangle.zw, corner);
@@ -23,5 +24,6 @@ void main() {
     v_bounds = vec4(place.xy + 0.5, place.xy + place.z - 0.5);
     v_plane_zw = gl_Position.zw;
     v_eye_zw = (clip_from_world * vec4(toward_eye, 0.0)).zw;
-    v_depth_range = depth_range;
+    v_depth_start = depth.x + dot(plane, depth.zw);
+    v_depth_span = depth.y;
 }

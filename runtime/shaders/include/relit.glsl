@@ -7,8 +7,8 @@ flat in int v_level, v_row;
 layout(location = 0) out vec4 relit;
 layout(location = 1) out float depth;
 
-vec4 colormap_entry(float code, int half) {
-    return texelFetch(colormap, ivec2(int(code * 255.0 + 0.5) + 256 * half, v_row), 0);
+vec4 colormap_entry(float code, int table) {
+    return texelFetch(colormap, ivec2(int(code * 255.0 + 0.5) + 256 * table, v_row), 0);
 }
 
 float depth_at(ivec2 texel) {

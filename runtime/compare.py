@@ -1,0 +1,178 @@
+"""Impostor against mesh: how far a fan's pictures are from what it was baked from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+
+import moderngl
+import numpy as np
+from flip_evaluator import evaluate
+from numpy.typing import ArrayLike, NDArray
+from skimage.metrics import structural_similarity
+
+from impostor.fan import Fan
+from impostor.lighting import DirectionalLight
+from impostor.model import Model
+from runtime.cameras import Camera
+from runtime.offscreen import Offscreen
+from runtime.renderer import DEFAULT_AMBIENT, DEFAULT_LIGHTS, ImpostorRenderer
+
+BACKGROUND = (0.4, 0.5, 0.6, 1.0)
+MESH_SAMPLES = 4
+SSIM_WINDOW = 7
+
+
+@dataclass(frozen=True)
+class Row:
+    """Means over the cameras of one elevation offset.
+
+    Parameters
+    ----------
+    method : str
+    offset_deg : float
+        Camera elevation above the fan's.
+    psnr_db : float
+        Of the sRGB values over the object's pixels: those that mesh or impostor touch.
+    ssim : float
+        Mean structural similarity over the object's pixels.
+    flip : float
+        Mean FLIP error over the object's pixels; 0 is equal.
+    iou : float
+        Intersection over union of the silhouettes (coverage of at least one half).
+    """
+
+    method: str
+    offset_deg: float
+    psnr_db: float
+    ssim: float
+    flip: float
+    iou: float
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """One camera's two pictures: (S, S, 4) uint8 each, sRGB, premultiplied alpha."""
+
+    mesh: NDArray[np.uint8]
+    impostor: NDArray[np.uint8]
+
+
+def bounding_sphere(model: Model) -> tuple[NDArray[np.float64], float]:
+    """Centre (3,) of the bounding box, and the distance from it to the farthest vertex."""
+    center = model.bounds.mean(axis=0)
+    used = (part.positions[np.unique(part.triangles)] for part in model.primitives)
+    distances = [np.linalg.norm(positions - center, axis=1) for positions in used]
+    return center, float(np.concatenate(distances).max())
+
+
+def between_cameras(fan: Fan, count: int) -> list[float]:
+    """Azimuths in radians, spread around the object, that lie between the fan's views at every fraction of the gap."""
+    views = len(fan.views)
+    index = np.floor(np.arange(count) * views / count)
+    return ((index + (np.arange(count) + 0.5) / count) * 2 * np.pi / views).tolist()
+
+
+class Comparison:
+    """Renders a fan and its mesh through the same cameras and lights.
+
+    Parameters
+    ----------
+    ctx : moderngl.Context
+    fan : Fan
+    model : Model
+    size : int, optional
+        Side of the pictures in pixels; that of the fan's tiles if not given.
+    lights, ambient
+        As `ImpostorRenderer` takes them.
+    """
+
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        fan: Fan,
+        model: Model,
+        size: int | None = None,
+        lights: Sequence[DirectionalLight] = DEFAULT_LIGHTS,
+        ambient: ArrayLike = DEFAULT_AMBIENT,
+    ):
+        size = fan.size if size is None else size
+        self._fan, self._sphere = fan, bounding_sphere(model)
+        self._fans, self._meshes = ImpostorRenderer(ctx), ImpostorRenderer(ctx)
+        for renderer in (self._fans, self._meshes):
+            renderer.lights, renderer.ambient = lights, ambient
+        self._fans.add(fan)
+        self._meshes.add_mesh(model)
+        self._impostor = Offscreen(ctx, size, size)
+        self._truth = Offscreen(ctx, size, size, MESH_SAMPLES)
+
+    def pair(self, azimuth: float, elevation: float) -> Pair:
+        """Both pictures from one orthographic camera (radians), on nothing."""
+        camera = Camera.orthographic(*self._sphere, azimuth, elevation)
+        matrices = (camera.clip_from_view, camera.view_from_world)
+        self._truth.clear()
+        self._meshes.draw_meshes(*matrices)
+        self._impostor.clear()
+        self._fans.draw(*matrices)
+        return Pair(self._truth.color(), self._impostor.color())
+
+    def rows(
+        self,
+        offsets_deg: Sequence[float],
+        cameras: int = 8,
+        method: str = "nearest",
+        progress: Callable[[int, int], object] = lambda done, total: None,
+    ) -> Iterator[tuple[Row, Pair]]:
+        """Measure at each elevation offset; yields a row and its first camera's pair."""
+        base = float(self._fan.settings.get("elevation", 0.0))
+        for number, offset in enumerate(offsets_deg):
+            measured, first = [], None
+            for index, azimuth in enumerate(between_cameras(self._fan, cameras)):
+                pair = self.pair(azimuth, np.radians(base + offset))
+                first = first or pair
+                measured.append(errors(pair))
+                progress(number * cameras + index + 1, len(offsets_deg) * cameras)
+            means = np.mean(measured, axis=0).tolist()
+            assert first is not None
+            yield Row(method, float(offset), *means), first
+
+    def release(self) -> None:
+        """Free everything on the GPU."""
+        for part in (self._fans, self._meshes, self._impostor, self._truth):
+            part.release()
+
+
+def over_background(pixels: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Premultiplied pixels (H, W, 4) over the comparison's background: (H, W, 3) float32, sRGB, 0 to 1."""
+    values = pixels.astype(np.float32) / 255
+    return values[..., :3] + (1 - values[..., 3:]) * np.array(BACKGROUND[:3], np.float32)
+
+
+def errors(pair: Pair) -> tuple[float, float, float, float]:
+    """PSNR in dB, SSIM, FLIP and silhouette IoU of one pair; see `Row`."""
+    truth, shown = over_background(pair.mesh), over_background(pair.impostor)
+    solid = pair.mesh[..., 3] >= 128, pair.impostor[..., 3] >= 128
+    iou = np.count_nonzero(solid[0] & solid[1]) / max(np.count_nonzero(solid[0] | solid[1]), 1)
+    pixels = (pair.mesh[..., 3] > 0) | (pair.impostor[..., 3] > 0)
+    if not pixels.any():
+        return np.inf, 1.0, 0.0, 1.0
+    square = float(np.mean((truth - shown)[pixels] ** 2))
+    psnr = -10 * np.log10(max(square, 1e-10))
+    window = min(SSIM_WINDOW, min(truth.shape[:2]) - 1 | 1)
+    _, similarity = structural_similarity(truth, shown, channel_axis=2, data_range=1, full=True, win_size=window)
+    flip_map = evaluate(truth, shown, "LDR")[0]
+    return psnr, float(similarity[pixels].mean()), float(flip_map[pixels].mean()), iou
+
+
+def side_by_side(pairs: Sequence[Pair], gain: float = 4.0) -> NDArray[np.uint8]:
+    """A row for each pair: mesh, impostor, difference around grey times `gain`; (rows * S, 3 S, 3) uint8."""
+    rows = []
+    for pair in pairs:
+        truth, shown = over_background(pair.mesh), over_background(pair.impostor)
+        rows.append(np.hstack([truth, shown, 0.5 + gain * (shown - truth)]))
+    return np.rint(np.clip(np.vstack(rows), 0, 1) * 255).astype(np.uint8)
+
+
+def as_json(rows: Sequence[Row]) -> dict[str, list[dict[str, object]]]:
+    """What `impostor compare --json` prints."""
+    return {"rows": [asdict(row) for row in rows]}
