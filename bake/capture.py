@@ -56,7 +56,7 @@ class Capture:
     size : int
         Side of a tile in texels.
     samples : int, optional
-        Samples along a texel's side: 1, 2 or 4. By default 2, or 4 for a model with cut-outs or transparency.
+        Samples along a texel's side: 1, 2 or 4. By default 2, or 4 for a model with textures.
 
     Raises
     ------
@@ -116,8 +116,8 @@ class Capture:
 
 
 def default_samples(model: Model) -> int:
-    """Samples along a texel's side that a model needs: 4 where it has cut-outs or transparency, else 2."""
-    return 2 if all(primitive.material.alpha_mode == "OPAQUE" for primitive in model.primitives) else 4
+    """Samples along a texel's side that a model needs: 4 where it has textures or cut-outs, else 2."""
+    return 2 if all(primitive.material.texture is None for primitive in model.primitives) else 4
 
 
 def _primitives(model: Model, origin: NDArray[Any]) -> list[_Primitive]:

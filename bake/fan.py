@@ -21,6 +21,7 @@ from impostor.views import Views, frame, layout_bases
 DILATION = 2  # texels past the silhouette: what bilinear filtering of a view can reach
 VIEWS_AT_ONCE = 16  # exact normals are held for so many views only
 SMALLEST_MIP = 4  # texels
+SPARED_BITS = 4  # of depth: 12 are finer than a quarter of a texel, and the file a fifth smaller
 STEEPEST_PLANE = 1.5  # slope; steeper quads lose more of their sides than they gain in the middle
 
 
@@ -124,7 +125,7 @@ class _Layers:
         layers, filled = dilate(stack, DILATION)
         part = slice(first, first + len(self._waiting))
         self._color[part] = layers.color
-        self._depth[part] = np.rint(layers.depth * DEPTH_CODES)
+        self._depth[part] = np.rint(layers.depth * (DEPTH_CODES >> SPARED_BITS)).astype(np.uint16) << SPARED_BITS
         covered = layers.coverage > 0
         levels = mip_codes(layers.normal, layers.coverage, len(self._level_sizes), mask=covered | filled)
         for stored, codes in zip(self._normal, levels, strict=True):

@@ -75,6 +75,8 @@ class Fan:
     def uniform_albedo(self) -> NDArray[np.uint8] | None:
         """The one sRGB colour (3,) uint8 of every covered texel, or None where the object is textured."""
         covered = self.color[self.color[..., 3] > 0]
+        if not len(covered):
+            return None
         low, high = covered[:, :3].min(axis=0), covered[:, :3].max(axis=0)
         return None if np.any(high - low > 1) else high
 
@@ -86,10 +88,10 @@ class Fan:
     @cached_property
     def covered_rectangles(self) -> NDArray[np.int32]:
         """(V, 4) int32: left, top, right, bottom of what each tile covers; right and bottom exclusive."""
-        covered = self.color[..., 3] > 0
+        covered: NDArray[np.bool_] = self.color[..., 3] > 0
         rectangles = np.zeros((len(self.views), 4), np.int32)
         for axis, (low, high) in ((1, (0, 2)), (2, (1, 3))):
-            line = covered.any(axis=axis)
+            line = np.logical_or.reduce(covered, axis=axis)
             rectangles[:, low] = line.argmax(axis=1)
             rectangles[:, high] = np.where(line.any(axis=1), line.shape[1] - line[:, ::-1].argmax(axis=1), 0)
         return rectangles

@@ -202,10 +202,9 @@ def _assembled(where, name: str, parts: list[Part], crease: float, welded=True, 
         raise ModelError(where, f"{total} triangles with all instances, expected at most {MOST_TRIANGLES}")
     by_material: dict[int, list[Part]] = {}
     for part in parts:
-        ready = finished_part(checked(where, part), crease, welded)
+        with np.errstate(all="ignore"):
+            ready = finished_part(where, checked(where, part), crease, welded)
         if ready is not None:
-            if not np.isfinite(ready.positions).all():
-                raise ModelError(where, f"{part.place}: coordinates leave the range of 32-bit floats")
             by_material.setdefault(id(ready.material), []).append(ready)
     if not by_material:
         found = f"{total} triangles, none of any area" if total else "no triangles"

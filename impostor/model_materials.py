@@ -231,14 +231,18 @@ def _mtl_texture(files: ModelFiles, place: str, lines: dict[str, str], allow_mis
 
 def _mtl_reference(value: str) -> str:
     """The file name behind a map statement's options; names may hold spaces."""
-    words = value.split(" ")
-    while len(words) > 1 and words[0].lower() in _MTL_OPTION_VALUES:
-        count = _MTL_OPTION_VALUES[words.pop(0).lower()]
-        # Three-number options may be written with fewer numbers.
-        while count and len(words) > 1 and (count == 1 or _is_number(words[0])):
-            words.pop(0)
-            count = 1 if count == 1 and words[0] == "" else count - 1
-    return " ".join(words)
+    option, _, rest = value.partition(" ")
+    while option.lower() in _MTL_OPTION_VALUES and rest:
+        count = _MTL_OPTION_VALUES[option.lower()]
+        for _ in range(count):
+            word, _, after = rest.strip().partition(" ")
+            # The options of three numbers may be written with fewer.
+            if not after or (count > 1 and not _is_number(word)):
+                break
+            rest = after
+        value = rest.strip()
+        option, _, rest = value.partition(" ")
+    return value
 
 
 def _is_number(word: str) -> bool:

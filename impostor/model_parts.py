@@ -11,6 +11,7 @@ from impostor.model_materials import Material
 from impostor.model_normals import agreeing_winding, computed_normals, face_vectors, repaired_normals, weld
 
 MOST_TRIANGLES = 100_000_000
+LARGEST_COORDINATE = 1e18
 
 
 @dataclass(eq=False)
@@ -92,16 +93,20 @@ def _check_finite(where, part: Part) -> None:
             raise ModelError(where, f"{part.place}: {name} of vertex {bad[0]} are {value}, expected finite numbers")
 
 
-def finished_part(part: Part, crease: float, welded: bool = True) -> Part | None:
+def finished_part(where, part: Part, crease: float, welded: bool = True) -> Part | None:
     """A checked part in world space: instances expanded, degenerate triangles dropped, normals unit and agreeing.
 
     Returns
     -------
     Part or None
         None when no triangle of any area is left.
+
+    Raises
+    ------
+    ModelError
+        When a coordinate is too large for sums of squares in 32-bit floats.
     """
-    part = _expanded(part)
-    _drop_unused(part)
+    part = _expanded(where, part)
     if welded and _is_soup(part):
         _merge_vertices(part)
     keep = (face_vectors(part.positions, part.triangles) != 0).any(axis=1)
@@ -155,12 +160,17 @@ def normal_matrix(linear: np.ndarray) -> np.ndarray:
     return np.where(mirrored[..., None, None], -cofactors, cofactors)
 
 
-def _expanded(part: Part) -> Part:
+def _expanded(where, part: Part) -> Part:
+    _drop_unused(part)
     count, instances = len(part.positions), len(part.worlds)
     worlds = np.asarray(part.worlds, np.float64)
     positions = part.positions.astype(np.float64) if instances > 1 or not _is_identity(worlds) else part.positions
     if positions is not part.positions:
         positions = np.concatenate([positions @ world[:3, :3].T + world[:3, 3] for world in worlds])
+    if not (np.abs(positions) <= LARGEST_COORDINATE).all():
+        raise ModelError(
+            where, f"{part.place}: a coordinate in the scene is beyond {LARGEST_COORDINATE:g} or not finite"
+        )
     normals = part.normals
     if normals is not None and positions is not part.positions:
         normals = np.concatenate([normals @ normal_matrix(world[:3, :3]).T for world in worlds])

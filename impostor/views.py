@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import ConvexHull, QhullError
 
 from impostor.errors import SettingsError
 
@@ -45,12 +47,12 @@ def basis_facing(back: ArrayLike) -> NDArray[np.float64]:
     ndarray, (..., 3, 3) float64
         Orthonormal and right-handed. A camera straight above or below takes +X as its right.
     """
-    back = np.asarray(back, float)
-    back = back / np.linalg.norm(back, axis=-1, keepdims=True)
-    right = np.stack([back[..., 2], np.zeros_like(back[..., 0]), -back[..., 0]], axis=-1)
+    along: NDArray[np.float64] = np.asarray(back, float)
+    along = along / np.linalg.norm(along, axis=-1, keepdims=True)
+    right = np.stack([along[..., 2], np.zeros_like(along[..., 0]), -along[..., 0]], axis=-1)
     length = np.linalg.norm(right, axis=-1, keepdims=True)
-    right = np.where(length > 1e-9, right / np.maximum(length, 1e-12), [1.0, 0.0, 0.0])
-    return np.stack([right, np.cross(back, right), back], axis=-2)
+    right = np.where(length > 1e-9, right / np.maximum(length, 1e-12), np.array([1.0, 0.0, 0.0]))
+    return np.stack([right, np.cross(along, right), along], axis=-2)
 
 
 def rotation_about_y(yaw: ArrayLike) -> NDArray[np.float64]:
@@ -273,7 +275,7 @@ def frame(
         The eye of a perspective camera stands inside the object's bounding sphere.
     """
     middle = (points.min(axis=0).astype(float) + points.max(axis=0)) / 2
-    points = np.asarray(points, np.float32) - middle.astype(np.float32)
+    points = _outermost(np.asarray(points, np.float32) - middle.astype(np.float32))
     reach = float(np.sqrt(np.einsum("ij,ij->i", points, points).max())) or 1.0
     if distance <= reach * 1.05:
         raise SettingsError("--perspective", f"{distance:g} m; expected more than {reach * 1.05:.4g} m for this object")
@@ -295,3 +297,11 @@ def frame(
     depth_range = np.stack([low[:, 2] - offset[:, 2] - slack, high[:, 2] - offset[:, 2] + slack], axis=-1)
     center = middle + np.einsum("vi,vij->vj", offset, bases)
     return Views(np.asarray(bases, float), center, np.full(len(bases), radius), depth_range, float(distance))
+
+
+def _outermost(points: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The corners of the convex hull: they reach as far as all points do, and are few."""
+    if len(points) > 1000:
+        with contextlib.suppress(QhullError):  # a flat object has no hull
+            return points[ConvexHull(points).vertices]
+    return points

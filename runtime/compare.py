@@ -145,7 +145,7 @@ class Comparison:
 def over_background(pixels: NDArray[np.uint8]) -> NDArray[np.float32]:
     """Premultiplied pixels (H, W, 4) over the comparison's background: (H, W, 3) float32, sRGB, 0 to 1."""
     values = pixels.astype(np.float32) / 255
-    return values[..., :3] + (1 - values[..., 3:]) * np.array(BACKGROUND[:3], np.float32)
+    return (values[..., :3] + (1 - values[..., 3:]) * np.array(BACKGROUND[:3])).astype(np.float32)
 
 
 def errors(pair: Pair) -> tuple[float, float, float, float]:
@@ -159,7 +159,7 @@ def errors(pair: Pair) -> tuple[float, float, float, float]:
     square = float(np.mean((truth - shown)[pixels] ** 2))
     psnr = -10 * np.log10(max(square, 1e-10))
     window = min(SSIM_WINDOW, min(truth.shape[:2]) - 1 | 1)
-    _, similarity = structural_similarity(truth, shown, channel_axis=2, data_range=1, full=True, win_size=window)
+    similarity = structural_similarity(truth, shown, channel_axis=2, data_range=1, full=True, win_size=window)[1]
     flip_map = evaluate(truth, shown, "LDR")[0]
     return psnr, float(similarity[pixels].mean()), float(flip_map[pixels].mean()), iou
 

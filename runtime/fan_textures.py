@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impostor.fan import Fan
+from impostor.files.fan_manifest import atlas_grid
 from impostor.lighting import linear_from_srgb, srgb_from_linear
-from runtime.gpu import SRGB8_ALPHA8, check_texture_size, grid_shape, tiles_to_atlas
+from runtime.gpu import SRGB8_ALPHA8, check_texture_size, tiles_to_atlas
 
 LINEAR_FROM_BYTE = linear_from_srgb(np.arange(256) / 255).astype(np.float32)
 
@@ -34,7 +35,7 @@ class FanTextures:
     def __init__(self, ctx: moderngl.Context, fan: Fan):
         self.fan = fan
         self.size, self.levels = fan.size, len(fan.normal)
-        self.columns, rows = grid_shape(len(fan.views))
+        self.columns, rows = atlas_grid(len(fan.views))
         width, height = self.columns * fan.size, rows * fan.size
         check_texture_size(ctx, fan.name, width, height)
         coverage = fan.color[..., 3]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impostor.errors import GpuError
+from impostor.files.fan_manifest import atlas_grid
 
 SHADERS = Path(__file__).with_name("shaders")
 EGL_PACKAGES = "libegl1 libgl1 libegl-mesa0 libgl1-mesa-dri"
@@ -103,16 +104,10 @@ def check_texture_size(ctx: moderngl.Context, what: str, width: int, height: int
         raise GpuError(what, f"needs a texture of {width}x{height}; this GPU holds at most {limit}x{limit}")
 
 
-def grid_shape(count: int) -> tuple[int, int]:
-    """Columns and rows of the near-square grid that holds `count` tiles, row by row."""
-    columns = int(np.ceil(np.sqrt(count)))
-    return columns, -(-count // columns)
-
-
 def tiles_to_atlas(tiles: NDArray[np.generic]) -> NDArray[np.generic]:
     """Lay tiles (V, S, S, ...) out in one image, near-square, row by row; missing tiles are zero."""
     count, size = tiles.shape[:2]
-    columns, rows = grid_shape(count)
+    columns, rows = atlas_grid(count)
     atlas = np.zeros((rows, size, columns, size, *tiles.shape[3:]), tiles.dtype)
     for row in range(rows):
         part = tiles[row * columns : (row + 1) * columns]

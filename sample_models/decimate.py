@@ -45,9 +45,7 @@ def _merged(points: np.ndarray, quadrics: np.ndarray, edges: np.ndarray) -> tupl
     return place, cost + 1e-3 * pull * length**2
 
 
-def decimate(
-    points: np.ndarray, faces: np.ndarray, target: int, weights: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def decimate(points: np.ndarray, faces: np.ndarray, target: int, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Collapse the edges that change a closed surface least.
 
     Parameters

@@ -38,8 +38,12 @@ def swatch(mesh: Mesh, region: str, scale: float = 1.0) -> Mesh:
     y = (corners - mesh.positions.min(axis=0)).swapaxes(1, 2)[rows, cross_axis] * scale
     x = np.clip(x, 0, None) % (width - 0.06) if np.ptp(x) < width - 0.06 else x / max(x.max(), 1e-9) * (width - 0.06)
     y = y if np.ptp(y) < height - 0.06 else y / max(y.max(), 1e-9) * (height - 0.06)
-    flat = Mesh(corners.reshape(-1, 3), mesh.normals[mesh.faces].reshape(-1, 3), texel(region, x + 0.03, y + 0.03).reshape(-1, 2), np.arange(corners.size // 3).reshape(-1, 3))
-    return flat
+    return Mesh(
+        corners.reshape(-1, 3),
+        mesh.normals[mesh.faces].reshape(-1, 3),
+        texel(region, x + 0.03, y + 0.03).reshape(-1, 2),
+        np.arange(corners.size // 3).reshape(-1, 3),
+    )
 
 
 def wall(region: str, corners: Sequence[Sequence[float]], right: Sequence[float], left_foot: Sequence[float]) -> Mesh:
@@ -54,17 +58,49 @@ def wall(region: str, corners: Sequence[Sequence[float]], right: Sequence[float]
 def walls() -> Mesh:
     """The outer walls of the main house and its front wing."""
     length, depth, low, high = HALF_LENGTH, HALF_DEPTH, WING_MIDDLE - WING_HALF, WING_MIDDLE + WING_HALF
-    front = wall("front", [(-length, 0, depth), (length, 0, depth), (length, EAVES, depth), (-length, EAVES, depth)], (1, 0, 0), (-length, 0, depth))
-    back = wall("back", [(length, 0, -depth), (-length, 0, -depth), (-length, EAVES, -depth), (length, EAVES, -depth)], (-1, 0, 0), (length, 0, -depth))
+    front = wall(
+        "front",
+        [(-length, 0, depth), (length, 0, depth), (length, EAVES, depth), (-length, EAVES, depth)],
+        (1, 0, 0),
+        (-length, 0, depth),
+    )
+    back = wall(
+        "back",
+        [(length, 0, -depth), (-length, 0, -depth), (-length, EAVES, -depth), (length, EAVES, -depth)],
+        (-1, 0, 0),
+        (length, 0, -depth),
+    )
     sides = []
     for sign in (1.0, -1.0):
         x = sign * length
-        outline = [(x, 0, sign * depth), (x, 0, -sign * depth), (x, EAVES, -sign * depth), (x, RIDGE, 0), (x, EAVES, sign * depth)]
+        outline = [
+            (x, 0, sign * depth),
+            (x, 0, -sign * depth),
+            (x, EAVES, -sign * depth),
+            (x, RIDGE, 0),
+            (x, EAVES, sign * depth),
+        ]
         sides.append(wall("side", outline, (0, 0, -sign), (x, 0, sign * depth)))
-    gable = [(low, 0, WING_FRONT), (high, 0, WING_FRONT), (high, EAVES, WING_FRONT), (WING_MIDDLE, WING_RIDGE, WING_FRONT), (low, EAVES, WING_FRONT)]
+    gable = [
+        (low, 0, WING_FRONT),
+        (high, 0, WING_FRONT),
+        (high, EAVES, WING_FRONT),
+        (WING_MIDDLE, WING_RIDGE, WING_FRONT),
+        (low, EAVES, WING_FRONT),
+    ]
     wing = wall("wing", gable, (1, 0, 0), (low, 0, WING_FRONT))
-    right = wall("cheek", [(high, 0, WING_FRONT), (high, 0, depth), (high, EAVES, depth), (high, EAVES, WING_FRONT)], (0, 0, -1), (high, 0, WING_FRONT))
-    left = wall("cheek", [(low, 0, depth), (low, 0, WING_FRONT), (low, EAVES, WING_FRONT), (low, EAVES, depth)], (0, 0, 1), (low, 0, depth))
+    right = wall(
+        "cheek",
+        [(high, 0, WING_FRONT), (high, 0, depth), (high, EAVES, depth), (high, EAVES, WING_FRONT)],
+        (0, 0, -1),
+        (high, 0, WING_FRONT),
+    )
+    left = wall(
+        "cheek",
+        [(low, 0, depth), (low, 0, WING_FRONT), (low, EAVES, WING_FRONT), (low, EAVES, depth)],
+        (0, 0, 1),
+        (low, 0, depth),
+    )
     return merge([front, back, *sides, wing, left, right])
 
 
@@ -74,8 +110,8 @@ def slab(top: np.ndarray, uvs: np.ndarray, thick: float) -> Mesh:
     points = np.concatenate([top, under])
     quads = [[0, 1, 2, 3], [7, 6, 5, 4], [4, 5, 1, 0], [5, 6, 2, 1], [6, 7, 3, 2], [7, 4, 0, 3]]
     faces = np.array([t for q in quads for t in ([q[0], q[1], q[2]], [q[0], q[2], q[3]])])
-    edge = np.concatenate([uvs, uvs + [0, 0.0]])
-    corner_uvs = edge[faces].copy()
+    edge = np.concatenate([uvs, uvs])
+    corner_uvs = edge[faces]
     rim = texel("wood", np.array([0.1, 1.4, 1.4, 0.1]), np.array([0.05, 0.05, 0.2, 0.2]))
     corner_uvs[2:] = rim[[0, 1, 2, 0, 2, 3]].reshape(-1, 3, 2).repeat(5, axis=0).reshape(10, 3, 2)
     return creased(points, faces, corner_uvs, angle_deg=20)
@@ -99,10 +135,15 @@ def roof() -> Mesh:
         near, far = WING_FRONT + over, 0.4
         ends = (far, near) if sign < 0 else (near, far)
         x = WING_MIDDLE + sign * run
-        top = np.array([(x, low, ends[0]), (x, low, ends[1]), (WING_MIDDLE, high, ends[1]), (WING_MIDDLE, high, ends[0])])
+        top = np.array(
+            [(x, low, ends[0]), (x, low, ends[1]), (WING_MIDDLE, high, ends[1]), (WING_MIDDLE, high, ends[0])]
+        )
         uvs = texel("roof", 1.3 + np.array([0, 1, 1, 0]) * (near - far), 0.4 + np.array([0, 0, 1, 1]) * run * slope)
         parts.append(slab(top, uvs, 0.13))
-    for start, end in (((-HALF_LENGTH - over, RIDGE + 0.09, 0), (HALF_LENGTH + over, RIDGE + 0.09, 0)), ((WING_MIDDLE, WING_RIDGE + 0.11, 1.2), (WING_MIDDLE, WING_RIDGE + 0.11, WING_FRONT + over))):
+    for start, end in (
+        ((-HALF_LENGTH - over, RIDGE + 0.09, 0), (HALF_LENGTH + over, RIDGE + 0.09, 0)),
+        ((WING_MIDDLE, WING_RIDGE + 0.11, 1.2), (WING_MIDDLE, WING_RIDGE + 0.11, WING_FRONT + over)),
+    ):
         count = int(np.linalg.norm(np.subtract(end, start)) / 0.38)
         for k in range(count):
             a, b = (np.add(start, np.subtract(end, start) * (k + t) / count) for t in (0.0, 1.06))
@@ -113,9 +154,19 @@ def roof() -> Mesh:
 def barge_boards() -> Mesh:
     """Cream boards along the gables' edges."""
     parts = []
-    for x, z, half, ridge, across in ((0, 0, HALF_DEPTH, RIDGE, "x"), (WING_MIDDLE, WING_FRONT + 0.29, WING_HALF, WING_RIDGE, "z")):
+    for x, z, half, ridge, across in (
+        (0, 0, HALF_DEPTH, RIDGE, "x"),
+        (WING_MIDDLE, WING_FRONT + 0.29, WING_HALF, WING_RIDGE, "z"),
+    ):
         run = half + 0.40
-        outline = [(-run, ridge - run * PITCH - 0.17), (0, ridge - 0.17), (run, ridge - run * PITCH - 0.17), (run, ridge - run * PITCH + 0.05), (0, ridge + 0.05), (-run, ridge - run * PITCH + 0.05)]
+        outline = [
+            (-run, ridge - run * PITCH - 0.17),
+            (0, ridge - 0.17),
+            (run, ridge - run * PITCH - 0.17),
+            (run, ridge - run * PITCH + 0.05),
+            (0, ridge + 0.05),
+            (-run, ridge - run * PITCH + 0.05),
+        ]
         board = swatch(extrude(outline, 0.05), "cream")
         if across == "z":
             parts.append(board.moved(x, 0, z))
@@ -130,11 +181,21 @@ def window(width: float, height: float, panes: tuple[int, int], shutters: bool) 
     glass = creased(
         [(-width / 2, 0, 0.02), (width / 2, 0, 0.02), (width / 2, height, 0.02), (-width / 2, height, 0.02)],
         [[0, 1, 2], [0, 2, 3]],
-        np.array([(left + 2, top + high - 2), (left + wide - 2, top + high - 2), (left + wide - 2, top + 2), (left + 2, top + 2)]) / ATLAS,
+        np.array(
+            [
+                (left + 2, top + high - 2),
+                (left + wide - 2, top + high - 2),
+                (left + wide - 2, top + 2),
+                (left + 2, top + 2),
+            ]
+        )
+        / ATLAS,
     )
     bars = [box((0.07, height + 0.07, 0.10)).moved(sign * width / 2, height / 2, 0.03) for sign in (-1, 1)]
     bars += [box((width + 0.07, 0.07, 0.10)).moved(0, y, 0.03) for y in (0.0, height)]
-    bars += [box((0.035, height, 0.05)).moved(width * (k / panes[0] - 0.5), height / 2, 0.03) for k in range(1, panes[0])]
+    bars += [
+        box((0.035, height, 0.05)).moved(width * (k / panes[0] - 0.5), height / 2, 0.03) for k in range(1, panes[0])
+    ]
     bars += [box((width, 0.03, 0.05)).moved(0, height * k / panes[1], 0.03) for k in range(1, panes[1])]
     parts = [glass, *(swatch(bar, "cream") for bar in bars)]
     parts.append(swatch(box((width + 0.26, 0.07, 0.22)).moved(0, -0.06, 0.09), "stone"))
@@ -152,7 +213,11 @@ def flower_box(width: float, seed: int) -> Mesh:
     parts = [trough]
     for k, x in enumerate(np.linspace(-width / 2 + 0.06, width / 2 - 0.06, int(width / 0.11))):
         ball = revolve(np.array(clump) * rng.uniform(0.085, 0.125), 8, 180).turned("z", rng.uniform(-40, 40))
-        parts.append(swatch(ball, ("flowers", "leaves")[k % 3 == 2]).moved(x, 0.20 + rng.uniform(-0.02, 0.05), 0.11 + rng.uniform(-0.04, 0.05)))
+        parts.append(
+            swatch(ball, ("flowers", "leaves")[k % 3 == 2]).moved(
+                x, 0.20 + rng.uniform(-0.02, 0.05), 0.11 + rng.uniform(-0.04, 0.05)
+            )
+        )
     return merge(parts)
 
 
@@ -161,7 +226,17 @@ def chimney() -> Mesh:
     parts = []
     low, high, wide, deep = RIDGE - 1.3, RIDGE + 1.35, 1.05, 0.72
     for turn, half, out in ((0, wide, deep), (90, deep, wide), (180, wide, deep), (270, deep, wide)):
-        face = wall("stack", [(-half / 2, low, out / 2), (half / 2, low, out / 2), (half / 2, high, out / 2), (-half / 2, high, out / 2)], (1, 0, 0), (-half / 2, low, out / 2))
+        face = wall(
+            "stack",
+            [
+                (-half / 2, low, out / 2),
+                (half / 2, low, out / 2),
+                (half / 2, high, out / 2),
+                (-half / 2, high, out / 2),
+            ],
+            (1, 0, 0),
+            (-half / 2, low, out / 2),
+        )
         parts.append(face.turned("y", turn))
     for y, grow in ((high - 0.16, 0.10), (high - 0.02, 0.18)):
         parts.append(swatch(box((wide + grow, 0.13, deep + grow)).moved(0, y, 0), "brick"))
@@ -179,8 +254,16 @@ def porch() -> Mesh:
     parts = [creased(outline, [[0, 1, 2], [0, 2, 3]], uvs)]
     parts += [swatch(box((0.12, 2.22, 0.14)).moved(sign * 0.56, 1.27, 0.05), "cream") for sign in (-1, 1)]
     parts.append(swatch(box((1.24, 0.14, 0.14)).moved(0, 2.33, 0.05), "cream"))
-    parts += [swatch(box((1.7, 0.16, 0.7)).moved(0, 0.08, 0.35), "stone"), swatch(box((2.1, 0.08, 1.1)).moved(0, 0.04, 0.55), "stone")]
-    parts.append(swatch(revolve([(0.0, -0.03), (0.03, -0.02), (0.035, 0.0), (0.03, 0.02), (0.0, 0.03)], 10).moved(0.36, 1.2, 0.09), "brass"))
+    parts += [
+        swatch(box((1.7, 0.16, 0.7)).moved(0, 0.08, 0.35), "stone"),
+        swatch(box((2.1, 0.08, 1.1)).moved(0, 0.04, 0.55), "stone"),
+    ]
+    parts.append(
+        swatch(
+            revolve([(0.0, -0.03), (0.03, -0.02), (0.035, 0.0), (0.03, 0.02), (0.0, 0.03)], 10).moved(0.36, 1.2, 0.09),
+            "brass",
+        )
+    )
     for sign in (1.0, -1.0):
         top_corners = np.array([(sign * 1.0, 2.48, 0.0), (sign * 1.0, 2.48, 0.95), (0, 3.02, 0.95), (0, 3.02, 0.0)])
         order = [1, 0, 3, 2] if sign > 0 else [0, 1, 2, 3]

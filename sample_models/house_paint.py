@@ -116,7 +116,7 @@ def ivy(image: np.ndarray, stems: list[tuple[float, float, float]], seed: int) -
         t = rng.random(count) ** 1.35
         offset = rng.normal(0, 1, count) * spread * (1 - 0.75 * t) * (0.75 + 0.4 * np.sin(7 * t + x))
         leaves += list(zip(x + offset + 14 * np.sin(5 * t), h - t * reach, rng.random(count), strict=True))
-    for x, y, shade in leaves:
+    for x, y, _ in leaves:
         canvas[max(int(y) - 3, 0) : int(y) + 8, max(int(x) - 4, 0) : int(x) + 7, :3] *= 0.94
     for x, y, shade in leaves:
         angle = rng.uniform(-1.3, 1.3)
@@ -132,7 +132,10 @@ def gable(width: int, height: int, eaves: int, seed: int) -> np.ndarray:
     half, step = width / 2, width / 8
     beams = [(half + k * step, top, half + k * step, 0) for k in range(-3, 4)]
     beams += [(0, top - 2, width, top - 2), (0, top * 0.52, width, top * 0.52)]
-    beams += [(half - 3 * step, top, half - 1.2 * step, top * 0.52), (half + 3 * step, top, half + 1.2 * step, top * 0.52)]
+    beams += [
+        (half - 3 * step, top, half - 1.2 * step, top * 0.52),
+        (half + 3 * step, top, half + 1.2 * step, top * 0.52),
+    ]
     timber(image, beams, 17, seed + 5)
     return image
 
@@ -155,7 +158,10 @@ def tiles(width: int, height: int, seed: int) -> np.ndarray:
         lower = course * 20 - 5 + 6.5 * offset**2
         inside = (up >= lower) & (depth < 0)
         height_in = np.clip((up - lower) / 24, 0, 1)
-        color = ramp(hue[course, column], ("#74463a", "#8d5644", "#a1674d", "#7c5a4c", "#95604a")) * tone[course, column][..., None]
+        color = (
+            ramp(hue[course, column], ("#74463a", "#8d5644", "#a1674d", "#7c5a4c", "#95604a"))
+            * tone[course, column][..., None]
+        )
         shade = (1.12 - 0.30 * height_in - 0.16 * np.abs(offset) ** 3)[..., None]
         shade = np.where((up - lower < 1.3)[..., None], 1.22, shade)
         image = np.where(inside[..., None], color * shade, image)
@@ -219,7 +225,9 @@ def paint_atlas() -> np.ndarray:
     leafy = noise(size["leaves"][::-1], 75, 0.8)
     art["leaves"] = ramp(0.5 + 0.2 * leafy, ("#3c5526", "#57742f", "#7c9440"))
     spots = noise(size["flowers"][::-1], 77, 0.5)
-    art["flowers"] = mix(ramp(0.5 + 0.2 * spots, ("#3c5a24", "#5f7d33")), rgb("#cf5a72"), np.clip(4 * spots - 0.4, 0, 1))
+    art["flowers"] = mix(
+        ramp(0.5 + 0.2 * spots, ("#3c5a24", "#5f7d33")), rgb("#cf5a72"), np.clip(4 * spots - 0.4, 0, 1)
+    )
     art["flowers"] = mix(art["flowers"], rgb("#ecd9d6"), np.clip(4 * noise(size["flowers"][::-1], 78, 0.5) - 5, 0, 1))
     art["brass"] = np.broadcast_to(rgb("#b08d4a"), (*size["brass"][::-1], 3))
 

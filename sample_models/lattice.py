@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -42,7 +43,16 @@ def tier(low: tuple[float, float, int], high: tuple[float, float, int], twist: f
 
 def gallery(radius: float, y: float) -> tuple[Mesh, Mesh]:
     """A round deck with a hole in the middle, and its railing."""
-    deck = revolve([(radius * 0.55, y), (radius + 0.55, y), (radius + 0.55, y + 0.12), (radius * 0.55, y + 0.12), (radius * 0.55, y)], 48)
+    deck = revolve(
+        [
+            (radius * 0.55, y),
+            (radius + 0.55, y),
+            (radius + 0.55, y + 0.12),
+            (radius * 0.55, y + 0.12),
+            (radius * 0.55, y),
+        ],
+        48,
+    )
     turns = np.arange(24) * (2 * np.pi / 24)
     posts = [tube([on_circle(radius + 0.5, t, y + 0.1), on_circle(radius + 0.5, t, y + 1.15)], 0.03, 4) for t in turns]
     rails = [hoop(radius + 0.5, y + h, 0.035, 4) for h in (0.65, 1.15)]
@@ -72,7 +82,7 @@ def make_lattice(folder: Path) -> None:
     stone = glb.add_material("concrete", "#9a948a", roughness=1.0)
     lamp = glb.add_material("lamp", "#c9a227", roughness=0.3)
 
-    tiers = [tier(a, b, np.radians(45 if k < 2 else 60)) for k, (a, b) in enumerate(zip(RINGS[:-1], RINGS[1:], strict=True))]
+    tiers = [tier(a, b, np.radians(45 if k < 2 else 60)) for k, (a, b) in enumerate(pairwise(RINGS))]
     rings = merge([hoop(r, y, RING_BAR, 8) for y, r, _ in RINGS[1:]])
     decks, rails = zip(*(gallery(r, y) for y, r, _ in (RINGS[2], RINGS[4])), strict=True)
     treads, pole = stair(0.95, 0.6, RINGS[2][0] - 0.1, 5.5)
@@ -81,7 +91,10 @@ def make_lattice(folder: Path) -> None:
     top = RINGS[-1][0]
     cabin = revolve([(0.75, top + 0.12), (0.75, top + 1.0), (0.82, top + 1.0), (0.82, top + 1.1)], 24)
     glass = revolve([(0.68, top + 1.1), (0.68, top + 1.9)], 24)
-    roof = revolve([(0.95, top + 1.9), (0.95, top + 2.0), (0.5, top + 2.4), (0.1, top + 2.6), (0.05, top + 5.6), (0.0, top + 5.7)], 24)
+    roof = revolve(
+        [(0.95, top + 1.9), (0.95, top + 2.0), (0.5, top + 2.4), (0.1, top + 2.6), (0.05, top + 5.6), (0.0, top + 5.7)],
+        24,
+    )
 
     root = glb.add_node("tower")
     base = [(merge([plinth, pad]), stone)]

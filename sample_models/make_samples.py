@@ -1,6 +1,6 @@
 """Make the sample models: the same files, byte for byte, on every run.
 
-    python sample_models/make_samples.py [--out FOLDER] [NAME ...]
+python sample_models/make_samples.py [--out FOLDER] [NAME ...]
 """
 
 from __future__ import annotations

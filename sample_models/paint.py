@@ -13,7 +13,7 @@ def rgb(color: str) -> np.ndarray:
     return np.array([int(color[i : i + 2], 16) for i in (1, 3, 5)]) / 255
 
 
-def noise(shape: tuple[int, int], seed: int, slope: float = 1.6, stretch: tuple[float, float] = (1, 1)) -> np.ndarray:
+def noise(shape: tuple[int, ...], seed: int, slope: float = 1.6, stretch: tuple[float, float] = (1, 1)) -> np.ndarray:
     """Cloudy noise that tiles, mean 0 and standard deviation 1.
 
     Parameters
@@ -106,12 +106,12 @@ def blade(
 
 def bleed(image: np.ndarray) -> np.ndarray:
     """Spread the covered colours into the transparent texels, so that filtering brings in no dark rim."""
-    nearest = distance_transform_edt(image[..., 3] < 0.5, return_distances=False, return_indices=True)
+    nearest = np.asarray(distance_transform_edt(image[..., 3] < 0.5, return_distances=False, return_indices=True))
     out = image.copy()
     out[..., :3] = image[..., :3][tuple(nearest)]
     empty = image[..., 3] <= 0
     mean = image[image[..., 3] > 0.5][:, :3].mean(axis=0)
-    far = distance_transform_edt(empty) > 12
+    far = np.asarray(distance_transform_edt(empty)) > 12
     out[far, :3] = mean
     return out
 

@@ -32,7 +32,7 @@ class Mesh:
 
     def moved(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Mesh:
         """The same mesh, translated."""
-        return replace(self, positions=self.positions + (x, y, z))
+        return replace(self, positions=self.positions + np.array([x, y, z]))
 
     def turned(self, axis: str, angle_deg: float) -> Mesh:
         """The same mesh, rotated about the x, y or z axis."""
@@ -165,12 +165,15 @@ def loft(sections: ArrayLike, angle_deg: float = 40.0, caps: bool = True) -> Mes
 
 
 def revolve(profile: ArrayLike, sides: int = 32, angle_deg: float = 40.0) -> Mesh:
-    """A solid of revolution about +Y: profile rows are (radius, y), from the bottom up along the outside."""
+    """A solid of revolution about +Y: profile rows are (radius, y), from the bottom up along the outside.
+
+    A profile that ends where it starts makes a ring; any other is closed with a disc at both ends.
+    """
     profile = np.asarray(profile, dtype=float)
     turn = np.linspace(0.0, 2 * np.pi, sides, endpoint=False)
     ring = np.stack([np.sin(turn), np.zeros(sides), np.cos(turn)], axis=-1)
     sections = profile[:, :1, None] * ring + profile[:, 1:, None] * (0.0, 1.0, 0.0)
-    return loft(sections, angle_deg)
+    return loft(sections, angle_deg, caps=not np.allclose(profile[0], profile[-1]))
 
 
 def frames(path: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -55,7 +55,15 @@ def shell_colors(turns: np.ndarray, around: np.ndarray) -> np.ndarray:
 
 def stand() -> Mesh:
     """A turned walnut foot."""
-    rows = [(0.040, 0.0), (0.040, 0.006), (0.037, 0.009), (0.030, 0.011), (0.026, 0.017), (0.024, 0.019), (0.024, 0.021)]
+    rows = [
+        (0.040, 0.0),
+        (0.040, 0.006),
+        (0.037, 0.009),
+        (0.030, 0.011),
+        (0.026, 0.017),
+        (0.024, 0.019),
+        (0.024, 0.021),
+    ]
     return revolve([*rows, (0.018, 0.021), (0.0, 0.016)], 48)
 
 
@@ -67,7 +75,9 @@ def make_shell(folder: Path) -> None:
     # The lip turns over, and the inner wall runs back into the shell.
     back = WHORLS - 0.60 * np.linspace(0, 1, 28) ** 1.3
     thickness = 1 - 0.05 * np.clip((WHORLS - back) / 0.015, 0, 1)
-    throat = grid(np.concatenate([whorl_surface(back[k : k + 1], around, thickness[k]) for k in range(len(back))]), around=True).flipped()
+    throat = grid(
+        np.concatenate([whorl_surface(back[k : k + 1], around, thickness[k]) for k in range(len(back))]), around=True
+    ).flipped()
     depth = np.broadcast_to(np.linspace(0, 1, len(back))[:, None], (len(back), len(around)))
     inside = ramp(depth, ("#f4e3d0", "#f0c6ad", "#e2a08c", "#c47a70", "#9a5757"))
 
@@ -87,15 +97,18 @@ def make_shell(folder: Path) -> None:
 
 def make_knot(folder: Path) -> None:
     """Write knot.stl: a trefoil of bevelled square bar, in metres."""
-    turn = np.linspace(0, 2 * np.pi, 181)
-    path = np.stack([np.sin(turn) + 2 * np.sin(2 * turn), np.cos(turn) - 2 * np.cos(2 * turn), -1.15 * np.sin(3 * turn)], axis=-1)
+    turn = np.linspace(0, 2 * np.pi, 241)
+    path = np.stack(
+        [np.sin(turn) + 2 * np.sin(2 * turn), np.cos(turn) - 2 * np.cos(2 * turn), -1.15 * np.sin(3 * turn)], axis=-1
+    )
     tangent, side, up = frames(path)
     closing = np.arctan2(side[-1] @ up[0], side[-1] @ side[0])
     twist = -turn / (2 * np.pi) * closing + turn
     corners = np.radians([45, 135, 225, 315])
     square = 0.62 * np.stack([np.cos(corners), np.sin(corners)], axis=-1)
     following = np.roll(square, -1, axis=0)
-    section = np.stack([square + 0.13 * (following - square), following + 0.13 * (square - following)], axis=1).reshape(-1, 2)
+    along = np.array([0.12, 0.37, 0.63, 0.88])[:, None]
+    section = np.concatenate([p + along * (q - p) for p, q in zip(square, following, strict=True)])
     a = np.cos(twist)[:, None] * side + np.sin(twist)[:, None] * up
     b = np.cross(tangent, a)
     points = path[:, None] + section[:, :1] * a[:, None] + section[:, 1:] * b[:, None]
@@ -104,5 +117,3 @@ def make_knot(folder: Path) -> None:
     low, high = knot.positions.min(axis=0), knot.positions.max(axis=0)
     points = (knot.positions - [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2]) * 0.04
     write_stl(folder / "knot.stl", replace(knot, positions=points))
-
-

@@ -5,116 +5,38 @@ The figure is modelled in metres with its feet at y = 0, facing +Z; its left sid
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from decimate import decimate
-from scipy.interpolate import RegularGridInterpolator
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
+from sculpture import Sculpture, capsule, draped, ellipsoid, pleat, soft_max, soft_min
 from shapes import Mesh, merge, revolve, rotation, tube, unit
-from skimage.measure import marching_cubes
 from writers import Glb
 
 DRUM = 0.46
-Point = Sequence[float]
 
-
-def soft_min(a: np.ndarray, b: np.ndarray, k: float) -> np.ndarray:
-    """The lesser of two distances, rounded over a width of k metres."""
-    h = np.maximum(k - np.abs(a - b), 0.0) / k
-    return np.minimum(a, b) - h * h * k / 4
-
-
-def soft_max(a: np.ndarray, b: np.ndarray, k: float) -> np.ndarray:
-    """The greater of two distances, rounded over a width of k metres."""
-    return -soft_min(-a, -b, k)
-
-
-def capsule(p: np.ndarray, a: Point, b: Point, ra: float, rb: float) -> np.ndarray:
-    """Distance to a rod from a to b whose radius goes from ra to rb; p is (..., 3)."""
-    a, axis = np.asarray(a, p.dtype), np.subtract(b, a).astype(p.dtype)
-    t = np.clip(((p - a) @ axis) / (axis @ axis), 0, 1)
-    return np.linalg.norm(p - a - t[..., None] * axis, axis=-1) - (ra + (rb - ra) * t)
-
-
-def ellipsoid(p: np.ndarray, center: Point, radii: Point) -> np.ndarray:
-    """Distance, to first order, to an ellipsoid along the axes."""
-    q = (p - np.asarray(center, p.dtype)) / np.asarray(radii, p.dtype)
-    length = np.linalg.norm(q, axis=-1)
-    slope = np.linalg.norm(q / np.asarray(radii, p.dtype), axis=-1)
-    return length * (length - 1) / np.maximum(slope, 1e-6)
-
-
-def pleat(phase: np.ndarray) -> np.ndarray:
-    """Cloth folds -0.6..0.4: rounded ridges, narrow valleys; one fold every pi."""
-    return np.abs(np.cos(phase)) - 0.6
-
-
-class Sculpture:
-    """A field of signed distances on a grid that is finer where there is more to see."""
-
-    def __init__(self, axes: tuple[np.ndarray, np.ndarray, np.ndarray]):
-        self.axes = axes
-        self.field = np.full([len(axis) for axis in axes], 1.0, dtype=np.float32)
-
-    def part(self, low: Point, high: Point) -> tuple[tuple[slice, ...], np.ndarray]:
-        """The piece of the grid inside a box: its slices and its points (..., 3)."""
-        slices = tuple(slice(*np.searchsorted(a, (l, h))) for a, l, h in zip(self.axes, low, high, strict=True))
-        grids = np.meshgrid(*(a[s] for a, s in zip(self.axes, slices, strict=True)), indexing="ij")
-        return slices, np.stack(grids, axis=-1).astype(np.float32)
-
-    def rod(self, a: Point, b: Point, ra: float, rb: float, k: float = 0.02) -> None:
-        """Blend in a tapered rod."""
-        margin = max(ra, rb) + k + 0.02
-        where, p = self.part(np.minimum(a, b) - margin, np.maximum(a, b) + margin)
-        self.field[where] = soft_min(self.field[where], capsule(p, a, b, ra, rb), k)
-
-    def polygon(self, triangles: int, cut: np.ndarray) -> Mesh:
-        """The surface at distance 0 where `cut` is negative, in at most so many triangles.
-
-        Its normals are the gradient of the uncut field, so that pieces cut from one figure shade alike at the joint.
-        """
-        vertices, faces, _, _ = marching_cubes(np.maximum(self.field, cut), 0.0)
-        rows = [np.arange(len(axis)) for axis in self.axes]
-        points = np.stack([np.interp(vertices[:, k], rows[k], self.axes[k]) for k in range(3)], axis=-1)
-        points, faces = largest(points, faces)
-        points, faces = decimate(points, faces, triangles, detail(points))
-        slope = np.stack(np.gradient(self.field, *self.axes), axis=-1)
-        normals = unit(RegularGridInterpolator(self.axes, slope)(points))
-        return Mesh(points, normals, np.zeros((len(points), 2)), faces)
-
-
-def largest(points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The connected piece with most triangles: crumbs and hollows inside are left out."""
-    edges = faces[:, [0, 1, 1, 2]].reshape(-1, 2)
-    graph = coo_matrix((np.ones(len(edges)), tuple(edges.T)), shape=(len(points), len(points)))
-    piece = connected_components(graph, directed=False)[1]
-    faces = faces[piece[faces[:, 0]] == np.bincount(piece[faces[:, 0]]).argmax()]
-    used, faces = np.unique(faces, return_inverse=True)
-    return points[used], faces.reshape(-1, 3)
-
-
-def table(y: np.ndarray, rows: Sequence[tuple[float, float, float]]) -> tuple[np.ndarray, np.ndarray]:
-    """Half widths along x and z at heights y, smoothly through rows of (y, x, z)."""
-    knots = np.array(rows)
-    fine = np.linspace(knots[0, 0], knots[-1, 0], 200)
-    bell = np.hanning(25) / np.hanning(25).sum()
-    curves = [np.convolve(np.pad(np.interp(fine, knots[:, 0], knots[:, k]), 12, mode="edge"), bell, "valid") for k in (1, 2)]
-    return np.interp(y, fine, curves[0]), np.interp(y, fine, curves[1])
-
-
-def draped(p: np.ndarray, rows: Sequence[tuple[float, float, float]], middle: Point = (0, 0)) -> tuple[np.ndarray, np.ndarray]:
-    """Distance to an upright body of elliptic sections, and the angle about it from +Z toward +X."""
-    a, b = table(p[..., 1], rows)
-    x, z = (p[..., 0] - middle[0]) / a, (p[..., 2] - middle[1]) / b
-    rho = np.hypot(x, z)
-    return (rho - 1) * np.minimum(a, b), np.arctan2(x, z)
-
-
-SKIRT = ((-0.05, 0.265, 0.245), (0.04, 0.255, 0.235), (0.25, 0.225, 0.20), (0.55, 0.20, 0.175), (0.80, 0.195, 0.165), (0.92, 0.19, 0.155), (1.05, 0.128, 0.105), (1.2, 0.12, 0.10))
-BODICE = ((0.70, 0.232, 0.200), (0.86, 0.222, 0.188), (0.95, 0.200, 0.165), (1.07, 0.130, 0.108), (1.15, 0.143, 0.118), (1.25, 0.164, 0.126), (1.34, 0.178, 0.112), (1.40, 0.165, 0.088), (1.46, 0.105, 0.068), (1.5, 0.06, 0.055))
+SKIRT = (
+    (-0.05, 0.265, 0.245),
+    (0.04, 0.255, 0.235),
+    (0.25, 0.225, 0.20),
+    (0.55, 0.20, 0.175),
+    (0.80, 0.195, 0.165),
+    (0.92, 0.19, 0.155),
+    (1.05, 0.128, 0.105),
+    (1.2, 0.12, 0.10),
+)
+BODICE = (
+    (0.70, 0.232, 0.200),
+    (0.86, 0.222, 0.188),
+    (0.95, 0.200, 0.165),
+    (1.07, 0.130, 0.108),
+    (1.15, 0.143, 0.118),
+    (1.25, 0.164, 0.126),
+    (1.34, 0.178, 0.112),
+    (1.40, 0.165, 0.088),
+    (1.46, 0.105, 0.068),
+    (1.5, 0.06, 0.055),
+)
 
 
 def robe(s: Sculpture) -> None:
@@ -143,7 +65,12 @@ def robe(s: Sculpture) -> None:
     bare = 1.372 + 0.55 * np.sqrt(x * x + 0.0004) + 0.055 * np.clip((0.02 - z) / 0.06, 0, 1)
     sag = y - 1.1 * np.sqrt(x * x + 0.0012)
     d = d - 0.010 * front * pleat(np.pi * sag / 0.042)
-    hem = 0.855 + 0.035 * np.sin(2 * turn + 0.6) + 0.016 * pleat(11 * warped + 0.5) + 0.05 * np.clip(np.abs(turn) / np.pi - 0.5, 0, 1)
+    hem = (
+        0.855
+        + 0.035 * np.sin(2 * turn + 0.6)
+        + 0.016 * pleat(11 * warped + 0.5)
+        + 0.05 * np.clip(np.abs(turn) / np.pi - 0.5, 0, 1)
+    )
     d = soft_max(soft_max(d, hem - y, 0.012), y - bare, 0.014)
     s.field[where] = np.minimum(s.field[where], d)
 
@@ -205,27 +132,36 @@ def arms(s: Sculpture) -> None:
         y = 0.030 - 0.0205 * k
         turn = np.radians(np.linspace(200, -40, 7))
         ring = np.stack([0.027 * np.sin(turn) * -1, np.full(7, y), 0.027 * np.cos(turn)], axis=-1) + grip
-        for a, b in zip(ring[:-1], ring[1:], strict=True):
+        for a, b in pairwise(ring):
             s.rod(a, b, 0.0105, 0.0100, 0.003)
-    s.rod(palm + (0.0, 0.020, 0.0), palm + (0.030, 0.045, 0.035), 0.011, 0.0095, 0.008)
+    s.rod(np.add(palm, (0.0, 0.020, 0.0)), np.add(palm, (0.030, 0.045, 0.035)), 0.011, 0.0095, 0.008)
 
     hand = np.array((0.205, 1.098, 0.235))
     s.rod(left[2], hand, 0.024, 0.026, 0.02)
     bowl = np.array((0.195, 1.155, 0.275))
     for k, angle in enumerate(np.radians((-55, -25, 5, 35))):
-        base = hand + (0.012 * (k - 1.5), 0.0, 0.012)
-        tip = bowl + (0.085 * np.sin(angle), -0.018, 0.085 * np.cos(angle))
+        base = np.add(hand, (0.012 * (k - 1.5), 0.0, 0.012))
+        tip = np.add(bowl, (0.085 * np.sin(angle), -0.018, 0.085 * np.cos(angle)))
         knuckle = (base + tip) / 2 + (0, -0.022, 0.012)
         s.rod(base, knuckle, 0.0115, 0.0105, 0.006)
         s.rod(knuckle, tip, 0.0105, 0.0085, 0.004)
     where, p = s.part(bowl - 0.15, bowl + 0.15)
-    dish = np.abs(ellipsoid(p, bowl + (0, 0.02, 0), (0.096, 0.062, 0.096))) - 0.007
+    dish = np.abs(ellipsoid(p, np.add(bowl, (0, 0.02, 0)), (0.096, 0.062, 0.096))) - 0.007
     s.field[where] = np.minimum(s.field[where], soft_max(dish, p[..., 1] - bowl[1] - 0.02, 0.006))
     where, p = s.part(bowl - 0.1, bowl + 0.1)
     s.field[where] = soft_min(s.field[where], ellipsoid(p, bowl, (0.085, 0.022, 0.085)), 0.004)
-    for x, y, z, r in ((0.0, 0.035, 0.035, 0.033), (0.042, 0.033, -0.015, 0.031), (-0.040, 0.033, -0.010, 0.032), (0.002, 0.068, -0.002, 0.032), (-0.035, 0.028, 0.045, 0.024), (0.045, 0.027, 0.042, 0.024), (0.0, 0.03, -0.055, 0.027)):
-        where, p = s.part(bowl + (x, y, z) - 0.06, bowl + (x, y, z) + 0.06)
-        s.field[where] = soft_min(s.field[where], np.linalg.norm(p - (bowl + (x, y, z)), axis=-1) - r, 0.004)
+    for x, y, z, r in (
+        (0.0, 0.035, 0.035, 0.033),
+        (0.042, 0.033, -0.015, 0.031),
+        (-0.040, 0.033, -0.010, 0.032),
+        (0.002, 0.068, -0.002, 0.032),
+        (-0.035, 0.028, 0.045, 0.024),
+        (0.045, 0.027, 0.042, 0.024),
+        (0.0, 0.03, -0.055, 0.027),
+    ):
+        fruit = np.add(bowl, (x, y, z))
+        where, p = s.part(fruit - 0.06, fruit + 0.06)
+        s.field[where] = soft_min(s.field[where], np.linalg.norm(p - fruit, axis=-1) - r, 0.004)
 
     # Short sleeves, pinned along the shoulder.
     for shoulder, elbow, _ in (right, left):
@@ -235,7 +171,9 @@ def arms(s: Sculpture) -> None:
         around = np.arctan2(p[..., 2] - shoulder[2], np.abs(p[..., 0] - shoulder[0]) * axis[1] + 1e-6)
         end = np.add(shoulder, axis * 0.16)
         sleeve = capsule(p, shoulder, end, 0.058, 0.070) - 0.008 * pleat(6 * around + 14 * along)
-        s.field[where] = soft_min(s.field[where], soft_max(sleeve, along - 0.135 - 0.01 * np.cos(5 * around), 0.01), 0.02)
+        s.field[where] = soft_min(
+            s.field[where], soft_max(sleeve, along - 0.135 - 0.01 * np.cos(5 * around), 0.01), 0.02
+        )
 
 
 def face(q: np.ndarray) -> np.ndarray:
@@ -289,7 +227,9 @@ def head(s: Sculpture) -> None:
     where, p = s.part((-0.25, 1.2, -0.2), (0.25, 1.6, 0.2))
     skin = ellipsoid(p, (0, 1.325, 0.0), (0.150, 0.118, 0.088))
     for side in (-1, 1):
-        skin = soft_min(skin, capsule(p, (side * 0.02, 1.44, -0.022), (side * 0.165, 1.392, -0.008), 0.038, 0.042), 0.04)
+        skin = soft_min(
+            skin, capsule(p, (side * 0.02, 1.44, -0.022), (side * 0.165, 1.392, -0.008), 0.038, 0.042), 0.04
+        )
     skin = soft_min(skin, capsule(p, (0, 1.40, -0.012), (0.006, 1.565, 0.004), 0.053, 0.044), 0.06)
     s.field[where] = soft_min(s.field[where], skin, 0.004)
     center = np.array((0.008, 1.636, 0.022), np.float32)
@@ -319,7 +259,7 @@ def feet(s: Sculpture) -> None:
         for k in range(5):
             root = np.add(ball, (side * (0.015 * k - 0.026), -0.002, 0.004 - 0.004 * k))
             size = 0.0135 if k == 0 else 0.0105 - 0.0006 * k
-            s.rod(root, root + (side * 0.003, -0.006, 0.034 - 0.003 * k), size, size * 0.92, 0.004)
+            s.rod(root, np.add(root, (side * 0.003, -0.006, 0.034 - 0.003 * k)), size, size * 0.92, 0.004)
 
 
 def detail(points: np.ndarray) -> np.ndarray:
@@ -333,10 +273,21 @@ def plinth() -> Mesh:
     """A turned drum with base and cap mouldings."""
     bead = np.radians(np.linspace(-90, 90, 9))
     torus = [(0.385 + 0.035 * np.cos(t), 0.095 + 0.035 * np.sin(t)) for t in bead]
-    hollow = [(0.335 + 0.05 * (1 - np.sin(t)), 0.145 + 0.04 * (1 - np.cos(t))) for t in np.radians(np.linspace(0, 90, 6))]
+    hollow = [
+        (0.335 + 0.05 * (1 - np.sin(t)), 0.145 + 0.04 * (1 - np.cos(t))) for t in np.radians(np.linspace(0, 90, 6))
+    ]
     cap = [(0.335 + 0.055 * np.sin(t) ** 2, 0.355 + 0.045 * t / 1.571) for t in np.linspace(0, np.pi / 2, 8)]
     rows = [(0.43, 0.0), (0.43, 0.05), (0.425, 0.055), (0.39, 0.06), *torus, (0.385, 0.135), *hollow, (0.335, 0.19)]
-    rows += [(0.330, 0.34), (0.335, 0.345), *cap, (0.40, 0.405), (0.405, 0.41), (0.405, 0.445), (0.39, DRUM), (0.0, DRUM)]
+    rows += [
+        (0.330, 0.34),
+        (0.335, 0.345),
+        *cap,
+        (0.40, 0.405),
+        (0.405, 0.41),
+        (0.405, 0.445),
+        (0.39, DRUM),
+        (0.0, DRUM),
+    ]
     return revolve(np.array(rows) * [1.17, 1.0], 72, angle_deg=35)
 
 
@@ -357,13 +308,18 @@ def carve(axes: tuple[np.ndarray, np.ndarray, np.ndarray], low: float, high: flo
     head(s)
     feet(s)
     y = axes[1][None, :, None].astype(np.float32)
-    return s.polygon(triangles, np.maximum(low - y, y - high))
+    return s.polygon(triangles, np.maximum(low - y, y - high), detail)
 
 
 def make_statue(folder: Path) -> None:
     """Write statue.glb."""
     cut, overlap = 1.500, 0.008
-    body = carve((np.arange(-0.50, 0.40, 0.0068), np.arange(-0.03, 1.55, 0.0080), np.arange(-0.34, 0.42, 0.0068)), -0.012, cut, 46_000)
+    body = carve(
+        (np.arange(-0.50, 0.40, 0.0068), np.arange(-0.03, 1.55, 0.0080), np.arange(-0.34, 0.42, 0.0068)),
+        -0.012,
+        cut,
+        46_000,
+    )
     fine = (np.arange(-0.13, 0.15, 0.0022), np.arange(1.47, 1.81, 0.0022), np.arange(-0.18, 0.16, 0.0022))
     crown = carve(fine, cut - overlap, 2.0, 22_000)
     shape = merge([merge([body, crown, staff()]).moved(y=DRUM), plinth()])

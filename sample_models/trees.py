@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from paint import bark, blade, bleed, noise, rgb, shrink, to_bytes
-from scipy.spatial import cKDTree
+from paint import bark, blade, bleed, rgb, shrink, to_bytes
+from scipy.spatial import KDTree
 from shapes import Mesh, frames, grid, merge, unit
-from writers import Glb, write_obj
+from writers import LICENCE, Glb, write_obj
 
 # Crown of the broadleaf tree: ellipsoids of leaves as (x, y, z, radius, height of the radius over it).
 PUFFS = np.array(
@@ -55,7 +55,8 @@ def grow(rng: np.random.Generator, step: float = 0.2) -> Skeleton:
     points = list(wander - wander[0])
     parents = [-1, *range(len(points) - 1)]
     for _ in range(90):
-        distance, nearest = cKDTree(np.array(points)).query(targets)
+        distance, nearest = KDTree(np.array(points)).query(targets)
+        nearest = np.asarray(nearest)
         targets, nearest = targets[distance > 2 * step], nearest[distance > 2 * step]
         if len(targets) == 0:
             break
@@ -68,7 +69,7 @@ def grow(rng: np.random.Generator, step: float = 0.2) -> Skeleton:
     return Skeleton(np.array(points), np.array(parents), np.zeros(len(points)))
 
 
-def thicken(skeleton: Skeleton, tip: float = 0.012, power: float = 2.1) -> Skeleton:
+def thicken(skeleton: Skeleton, tip: float = 0.0135, power: float = 2.1) -> Skeleton:
     """Set the radii by the pipe model, and straighten small kinks."""
     points, parents = skeleton.points.copy(), skeleton.parents
     area = np.zeros(len(points))
@@ -148,7 +149,7 @@ def foliage(skeleton: Skeleton, count: int, rng: np.random.Generator) -> Mesh:
     growth = unit(skeleton.points[node] - skeleton.points[skeleton.parents[node]])
     outward = unit((base - CROWN) / [1, 0.9, 1])
     up = unit(0.6 * growth + 0.7 * outward + rng.normal(0, 0.55, (count, 3)) - [0, 0.15, 0])
-    front = unit(outward + [0, 0.35, 0] + rng.normal(0, 0.55, (count, 3)))
+    front = unit(np.add(outward, [0, 0.35, 0]) + rng.normal(0, 0.55, (count, 3)))
     front = unit(front - up * np.einsum("ij,ij->i", front, up)[:, None])
     across = np.cross(up, front)
     size = rng.uniform(0.50, 0.78, (count, 1))
@@ -202,7 +203,7 @@ def make_tree(folder: Path) -> None:
     rng = np.random.default_rng(7)
     skeleton = thicken(grow(rng))
     trunk, leaves = wood(skeleton), foliage(skeleton, 2800, rng)
-    cells = [leaf_cluster(384, color, 20 + k) for k, color in enumerate(("#4a6428", "#5f7d32", "#75913b", "#8fa548"))]
+    cells = [leaf_cluster(384, color, 20 + k) for k, color in enumerate(("#4a612f", "#5e7838", "#748b43", "#8d9f50"))]
     atlas = np.concatenate([np.concatenate(cells[:2], axis=1), np.concatenate(cells[2:], axis=1)])
     glb = Glb("tree")
     bark_texture = glb.add_texture(to_bytes(bark(512, 3, ("#3a3028", "#6b5a49", "#8d7c68", "#a39481"), "#66703f")), 85)
@@ -250,7 +251,9 @@ def frond_texture(size: int = 512) -> np.ndarray:
         base, tip, step = needles[index]
         fresh = 0.72 + 0.40 * step + rng.normal(0, 0.10)
         blade(canvas, base, tip, 0.0062 * big, rgb("#56744c") * fresh * rng.uniform(0.94, 1.06, 3))
-    canvas[:, : int(left)] = np.concatenate([np.tile(rgb("#2c4a33"), (big, int(left), 1)), np.zeros((big, int(left), 1))], -1)
+    canvas[:, : int(left)] = np.concatenate(
+        [np.tile(rgb("#2c4a33"), (big, int(left), 1)), np.zeros((big, int(left), 1))], -1
+    )
     image = bleed(shrink(canvas, 2))
     strip = bark(size, 31, ("#33271f", "#5f4838", "#836753", "#967b66"))[:, : int(0.145 * size)]
     image[:, : strip.shape[1], :3] = strip
@@ -266,9 +269,11 @@ def frond(foot: np.ndarray, azimuth: float, length: float, width: float, rise: f
     height = length * (rise * along - 0.66 * along**1.5 + 0.42 * along**3)
     spine = foot + length * along[:, None] * outward + height[:, None] * (0, 1, 0)
     wing = np.array([1.0, 0.0, -1.0])
-    points = spine[:, None] + width / 2 * wing[:, None] * (across + (0, roll, 0))
+    points = spine[:, None] + width / 2 * wing[:, None] * np.add(across, (0, roll, 0))
     points[..., 1] -= np.abs(wing) * width * 0.20
-    texel = np.stack(np.broadcast_arrays((FROND_LEFT + 1) / 2 + (1 - FROND_LEFT) / 2 * wing, 1 - along[:, None]), axis=-1)
+    texel = np.stack(
+        np.broadcast_arrays((FROND_LEFT + 1) / 2 + (1 - FROND_LEFT) / 2 * wing, 1 - along[:, None]), axis=-1
+    )
     sheet = grid(points, texel)
     middle = np.array([0, foot[1] - 0.35 * length, 0])
     normals = unit(0.8 * unit(sheet.positions - middle) + (0, 0.5, 0) + 0.45 * sheet.normals)
@@ -293,8 +298,9 @@ def make_pine(folder: Path) -> None:
         rise = 0.06 + 0.34 * t**2 + rng.normal(0, 0.06)
         parts.append(frond(foot, azimuth, length, length * 0.46 + 0.14, rise, rng.normal(0, 0.22)))
     for azimuth in (0.0, 1.05, 2.1, 3.15, 4.2, 5.25):
-        parts.append(frond(np.array([0.03 * np.sin(8.1), 8.15, 0]), azimuth, 0.20, 0.18, 2.3, 0.0))
-    materials = (
-        "newmtl bark\nKd 1 1 1\nmap_Kd pine.png\n\nnewmtl needles\nKd 1 1 1\nmap_Kd pine.png\nmap_d -imfchan m pine.png\n"
-    )
+        leader = frond(np.array([0.03 * np.sin(8.1), 8.15, 0]), azimuth, 0.20, 0.18, 2.3, 0.0)
+        parts.append(replace(leader, faces=leader.faces[:, ::-1]))
+    bark_material = "newmtl bark\nKd 1 1 1\nmap_Kd pine.png\n"
+    needle_material = "newmtl needles\nKd 1 1 1\nmap_Kd pine.png\nmap_d -imfchan m pine.png\n"
+    materials = f"# {LICENCE}\n{bark_material}\n{needle_material}"
     write_obj(folder / "pine.obj", [("bark", trunk), ("needles", merge(parts))], materials, frond_texture())

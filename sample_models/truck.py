@@ -142,7 +142,11 @@ def crate() -> Mesh:
     faces = [side, side.turned("x", 90), side.turned("x", -90), side.turned("z", 90), side.turned("z", -90)]
     edge = box((0.05, size + 0.02, 0.05), 0.006)
     edges = [edge.moved(x=sx * size / 2, z=sz * size / 2) for sx in (-1, 1) for sz in (-1, 1)]
-    bars = [box((0.05, 0.05, size), 0.006).moved(x=sx * size / 2, y=sy * (size - 0.03) / 2) for sx in (-1, 1) for sy in (-1, 1)]
+    bars = [
+        box((0.05, 0.05, size), 0.006).moved(x=sx * size / 2, y=sy * (size - 0.03) / 2)
+        for sx in (-1, 1)
+        for sy in (-1, 1)
+    ]
     rest = [bar.turned("y", 90) for bar in bars]
     return merge([*faces, *edges, *bars, *rest]).moved(y=size / 2 + 0.01)
 
@@ -151,12 +155,19 @@ def barrel() -> tuple[Mesh, Mesh]:
     """Staves and hoops of a barrel standing on the origin."""
     y = np.linspace(0, 0.78, 9)
     radius = 0.24 + 0.055 * (1 - (2 * y / 0.78 - 1) ** 2)
-    body = revolve([(0.0, 0.03), (0.22, 0.03), (0.22, 0.0), *zip(radius, y, strict=True), (0.22, 0.78), (0.22, 0.75), (0.0, 0.75)], 28)
+    body = revolve(
+        [(0.0, 0.03), (0.22, 0.03), (0.22, 0.0), *zip(radius, y, strict=True), (0.22, 0.78), (0.22, 0.75), (0.0, 0.75)],
+        28,
+    )
     hoops = []
     for low in (0.07, 0.25, 0.48, 0.66):
         ring = np.interp([low, low + 0.05], y, radius) + 0.006
-        hoops.append(revolve([(ring[0] - 0.03, low), (ring[0], low), (ring[1], low + 0.05), (ring[1] - 0.03, low + 0.05)], 28))
-    uvs = np.stack([np.arctan2(body.positions[:, 0], body.positions[:, 2]) * 0.6, body.positions[:, 1] * 0.5], axis=-1)
+        hoops.append(
+            revolve([(ring[0] - 0.03, low), (ring[0], low), (ring[1], low + 0.05), (ring[1] - 0.03, low + 0.05)], 28)
+        )
+    x, height, z = body.positions.T
+    lid = np.abs(body.normals[:, 1:2]) > 0.7
+    uvs = np.where(lid, np.stack([2 * x, 0.5 * z], axis=-1), np.stack([0.6 * np.arctan2(x, z), 0.5 * height], axis=-1))
     return replace(body, uvs=uvs), merge(hoops)
 
 
@@ -182,7 +193,9 @@ def bed(glb: Glb, parent: int, wood: int, steel: int) -> None:
 
     cargo = glb.add_node("cargo", parent=node, at=(0, 0.025, 0))
     crates = glb.add_mesh("crate", [(crate(), wood)])
-    for k, (x, y, z, turn) in enumerate(((0.5, 0, 0.62, 4), (-0.12, 0, 0.66, -6), (0.46, 0, -0.02, -3), (0.28, 0.55, 0.55, 21))):
+    for k, (x, y, z, turn) in enumerate(
+        ((0.5, 0, 0.62, 4), (-0.12, 0, 0.66, -6), (0.46, 0, -0.02, -3), (0.28, 0.55, 0.55, 21))
+    ):
         glb.add_node(f"crate {k + 1}", crates, cargo, at=(x, y, z), turn=("y", turn))
     staves, hoops = barrel()
     barrels = glb.add_mesh("barrel", [(staves, wood), (hoops, steel)])
@@ -190,7 +203,9 @@ def bed(glb: Glb, parent: int, wood: int, steel: int) -> None:
         glb.add_node(f"barrel {k + 1}", barrels, cargo, at=(x, 0, z), turn=("y", 70 * k))
 
 
-def left_side(glb: Glb, paint: int, trim: int, chrome: int, glass: int, black: int) -> dict[str, tuple[int, tuple[float, float, float]]]:
+def left_side(
+    glb: Glb, paint: int, trim: int, chrome: int, glass: int, black: int
+) -> dict[str, tuple[int, tuple[float, float, float]]]:
     """The meshes that both sides share: name -> (mesh, place) on the left side."""
     door = on_skin(0.72, 1.30, (0.79, 0.66), (0.79, -0.27), 0.012)
     window = on_skin(1.40, 1.76, (0.72, 0.50), (0.72, -0.18), 0.012)
@@ -200,7 +215,9 @@ def left_side(glb: Glb, paint: int, trim: int, chrome: int, glass: int, black: i
     step = merge([box((0.34, 0.05, 1.45), 0.02).moved(0.82, 0.50, 0.17)])
     treads = merge([box((0.025, 0.012, 1.30), 0.004).moved(0.72 + 0.05 * k, 0.53, 0.17) for k in range(5)])
     arm = tube([(0.76, 1.36, 0.56), (0.93, 1.42, 0.62), (0.96, 1.50, 0.62)], 0.013, 8)
-    glass_disc = revolve([(0.0, -0.02), (0.08, -0.015), (0.10, 0.01), (0.0, 0.012)], 20).turned("x", -90).moved(0.96, 1.58, 0.62)
+    glass_disc = (
+        revolve([(0.0, -0.02), (0.08, -0.015), (0.10, 0.01), (0.0, 0.012)], 20).turned("x", -90).moved(0.96, 1.58, 0.62)
+    )
     pod, lens = lamp(0.135)
     return {
         "door": (glb.add_mesh("door", [(door, paint), (stripe, trim), (handle, chrome)]), (0, 0, 0)),
@@ -230,8 +247,12 @@ def make_truck(folder: Path) -> None:
     horns = [box((0.07, 0.07, 0.50), 0.015).moved(x, 0.54, 2.30) for x in (-0.40, 0.40)]
     apron = box((0.98, 0.10, 0.40), 0.04).moved(0, 0.58, 2.20)
     rails = merge([*rails, *horns, apron])
-    tank = revolve([(0.0, -0.42), (0.16, -0.42), (0.17, -0.4), (0.17, 0.4), (0.16, 0.42), (0.0, 0.42)], 24).turned("x", 90)
-    chassis = glb.add_node("chassis", glb.add_mesh("chassis", [(rails, steel), (tank.moved(0.62, 0.62, -0.62), steel)]), truck)
+    tank = revolve([(0.0, -0.42), (0.16, -0.42), (0.17, -0.4), (0.17, 0.4), (0.16, 0.42), (0.0, 0.42)], 24).turned(
+        "x", 90
+    )
+    chassis = glb.add_node(
+        "chassis", glb.add_mesh("chassis", [(rails, steel), (tank.moved(0.62, 0.62, -0.62), steel)]), truck
+    )
 
     tyre, disc, cap = wheel()
     wheels = glb.add_mesh("wheel", [(tyre, rubber), (disc, trim), (cap, chrome)])
@@ -245,7 +266,9 @@ def make_truck(folder: Path) -> None:
     windscreen = on_skin(1.41, 1.75, (-0.60, 0.80), (0.60, 0.80), 0.012)
     seal = on_skin(1.375, 1.785, (-0.645, 0.78), (0.645, 0.78), 0.006)
     rear = on_skin(1.44, 1.72, (0.42, -0.40), (-0.42, -0.40), 0.012)
-    body = glb.add_node("cab", glb.add_mesh("cab", [(cab_shell(), paint), (seal, rubber), (windscreen, glass), (rear, glass)]), truck)
+    body = glb.add_node(
+        "cab", glb.add_mesh("cab", [(cab_shell(), paint), (seal, rubber), (windscreen, glass), (rear, glass)]), truck
+    )
     glb.add_node("hood", glb.add_mesh("hood", [(hood(), paint)]), body)
     bars = merge([box((0.62 - 0.018 * k, 0.026, 0.05), 0.01).moved(0, 0.68 + 0.055 * k, 2.305) for k in range(8)])
     plate = box((0.62, 0.46, 0.03), 0.012).moved(0, 0.87, 2.292)

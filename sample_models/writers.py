@@ -191,7 +191,7 @@ def write_obj(path: Path, parts: Sequence[tuple[str, Mesh]], materials: str, tex
     for name, mesh in parts:
         lines += [f"o {name}", f"usemtl {name}"]
         lines += ["v {:.3f} {:.3f} {:.3f}".format(*row) for row in mesh.positions]
-        lines += ["vt {:.4f} {:.4f}".format(u, 1.0 - v) for u, v in mesh.uvs]
+        lines += [f"vt {u:.4f} {1.0 - v:.4f}" for u, v in mesh.uvs]
         lines += ["vn {:.3f} {:.3f} {:.3f}".format(*row) for row in mesh.normals]
         lines += [f"f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}" for a, b, c in mesh.faces + start]
         start += len(mesh.positions)

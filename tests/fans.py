@@ -1,10 +1,14 @@
 """Small fans made from formulas, for tests that need one and do not care what it shows."""
 
+from pathlib import Path
+
 import numpy as np
 
 from impostor.fan import Fan
 from impostor.normal_code import mip_codes
 from impostor.views import Views, frame, layout_bases
+
+GOLDEN = Path(__file__).parent / "golden" / "version_1.fan"  # written once from pattern_fan(), kept for ever
 
 
 def sound_codes(values):
@@ -61,7 +65,22 @@ def bumpy_torus_fan(count=12, size=128, textured=False, seed=0):
         painted = 128 + 90 * np.sin(5 * normals) + rng.normal(0, 1, normals.shape)
         color[..., :3] = np.where(coverage[..., None] > 0, painted, 128)
     color[..., 3] = 255 * coverage
-    depth = np.rint(np.where(coverage, 0.1 + height, 0.1) / 0.6 * 4095).astype(np.uint16) << 4
+    depth = np.rint(np.where(coverage, 0.1 + height, 0.1) / 0.6 * 4095).astype(np.uint16) * np.uint16(16)
     views = frame(layout_bases("ring", count, 0.25), np.array([[-1.2, -1.2, -0.4], [1.2, 1.2, 0.4]]), size)
     normal = tuple(mip_codes(normals, coverage, size.bit_length()))
     return Fan("torus", "ring", views, color, normal, depth, coverage > 0)
+
+
+def assert_same_fan(found, expected):
+    """Equal to the last bit, types included."""
+    assert (found.name, found.layout) == (expected.name, expected.layout)
+    assert (found.source, found.settings) == (expected.source, expected.settings)
+    assert found.views.distance == expected.views.distance
+    for key in ("basis", "center", "radius", "depth_range", "plane"):
+        assert np.array_equal(getattr(found.views, key), getattr(expected.views, key)), key
+    for key in ("color", "depth", "silhouette"):
+        a, b = getattr(found, key), getattr(expected, key)
+        assert a.dtype == b.dtype, key
+        assert np.array_equal(a, b), key
+    assert len(found.normal) == len(expected.normal)
+    assert all(np.array_equal(a, b) for a, b in zip(found.normal, expected.normal, strict=True))

@@ -23,6 +23,7 @@ from impostor.files.fan_manifest import (
     VERSION,
     LayerShape,
     Manifest,
+    ViewEntry,
     atlas_grid,
     layer_shapes,
     manifest_bytes,
@@ -165,9 +166,8 @@ def _manifest(fan: Fan, shapes: list[LayerShape], images: list[bytes]) -> bytes:
 
 def _manifest_fields(fan: Fan, shapes: list[LayerShape], images: list[bytes]) -> dict[str, Any]:
     views, distance = fan.views, float(fan.views.distance)
-    cameras = zip(
-        *(array.tolist() for array in (views.basis, views.center, views.radius, views.depth_range)), strict=True
-    )
+    keys = ViewEntry.__struct_fields__
+    cameras = zip(*(getattr(views, key).tolist() for key in keys), strict=True)
     columns, rows = atlas_grid(len(views))
     return {
         "format": FORMAT,
@@ -179,7 +179,7 @@ def _manifest_fields(fan: Fan, shapes: list[LayerShape], images: list[bytes]) ->
         "columns": columns,
         "rows": rows,
         "distance": None if distance == np.inf else distance,
-        "views": [dict(zip(("basis", "center", "radius", "depth_range"), camera, strict=True)) for camera in cameras],
+        "views": [dict(zip(keys, camera, strict=True)) for camera in cameras],
         "layers": [
             {
                 "file": shape.file,

@@ -34,6 +34,7 @@ class ViewEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     center: Vector
     radius: Annotated[float, Meta(gt=0)]
     depth_range: tuple[float, float]
+    plane: Vector
 
 
 class LayerEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -96,6 +97,7 @@ class Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             np.array([view.radius for view in self.views]),
             np.array([view.depth_range for view in self.views]),
             math.inf if self.distance is None else self.distance,
+            np.array([view.plane for view in self.views]),
         )
 
 
@@ -196,7 +198,7 @@ def _plain(value: Any) -> Any:
 
 def _decode(data: bytes, kind: type, where: str | PathLike[str], error: type[ImpostorError]) -> Any:
     try:
-        return msgspec.json.decode(data.decode(), type=kind)  # msgspec itself looks at the UTF-8 it needs, not at all
+        return msgspec.json.decode(data.decode(), type=kind)  # msgspec does not check the UTF-8 of what it refuses
     except msgspec.ValidationError as found:
         raise error(where, f"manifest {_readable(str(found), data)}") from None
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as found:
@@ -261,6 +263,8 @@ def _camera_problems(views: Views) -> Iterator[str]:
         yield f"$.views[{index}].basis: {views.basis[index].tolist()}; expected a right-handed basis"
     for index in _first(low >= high):
         yield f"$.views[{index}].depth_range: {low[index]:g}, {high[index]:g}; expected the lower one first"
+    for index in _first(views.plane[:, 0] >= views.distance):
+        yield f"$.views[{index}].plane: {views.plane[index].tolist()}; expected an offset less than $.distance"
     for index in _first(high >= views.distance):
         yield f"$.distance: {views.distance:g}; expected more than $.views[{index}].depth_range[1], {high[index]:g}"
 

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from impostor.fan import Fan
 from impostor.files.fan_file import read_fan, validate_fan, write_fan
 from impostor.views import LAYOUTS, Views, basis_facing
-from tests.fans import sound_codes
-from tests.unit.test_fan_file import assert_same
+from tests.fans import assert_same_fan, sound_codes
 
 finite = st.floats(-1e6, 1e6)
 plain = st.one_of(st.none(), st.booleans(), st.integers(-(2**53), 2**53), finite, st.text(max_size=8))
@@ -45,7 +44,7 @@ def test_write_then_read_is_the_identity(fan):
         path = Path(directory) / "a.fan"
         write_fan(path, fan)
         first = path.read_bytes()
-        assert_same(read_fan(path), fan)
+        assert_same_fan(read_fan(path), fan)
         assert validate_fan(path) == []
         write_fan(path, read_fan(path), force=True)
         assert path.read_bytes() == first

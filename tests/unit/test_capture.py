@@ -15,6 +15,7 @@ from benchmarks.raw_pass import RawPass
 from impostor.errors import GpuError, SettingsError
 from impostor.model import Material, Model, Primitive
 from impostor.views import View, basis_facing, direction, frame
+from tests.data import ROOT
 
 SIZE = 64
 GREY = Material(base_color=(0.5, 0.5, 0.5, 1.0), double_sided=False)
@@ -303,7 +304,7 @@ def test_a_broken_shader_is_named_and_shown_with_its_lines(tmp_path, monkeypatch
 
 
 def run(code):
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, cwd=ROOT)
 
 
 def test_without_opengl_the_error_says_what_to_install():
