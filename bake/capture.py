@@ -117,7 +117,8 @@ class Capture:
 
 def default_samples(model: Model) -> int:
     """Samples along a texel's side that a model needs: 4 where it has textures or cut-outs, else 2."""
-    return 2 if all(primitive.material.texture is None for primitive in model.primitives) else 4
+    materials = [primitive.material for primitive in model.primitives]
+    return 2 if all(material.texture is None and material.alpha_mode == "OPAQUE" for material in materials) else 4
 
 
 def _primitives(model: Model, origin: NDArray[Any]) -> list[_Primitive]:

@@ -34,6 +34,7 @@ def bake_fan(
     size: int = 256,
     distance: float = np.inf,
     samples: int | None = None,
+    up: str = "y",
     progress: Callable[[int, int], object] = lambda done, total: None,
 ) -> Fan:
     """Bake a model into a fan.
@@ -52,6 +53,8 @@ def bake_fan(
         From the object to a perspective camera's eye in metres; orthographic if infinite.
     samples : int, optional
         Samples along a texel's side; see `bake.capture.Capture`.
+    up : str
+        The up axis that the model was loaded with; only recorded.
     progress : callable
         Called with views done and views in all.
 
@@ -73,8 +76,7 @@ def bake_fan(
     if not MIN_SIZE <= size <= MAX_SIZE:
         raise SettingsError("--size", f"{size} texels; expected {MIN_SIZE} to {MAX_SIZE}")
     bases = layout_bases(layout, views, np.radians(elevation_deg))
-    used = np.concatenate([part.positions[np.unique(part.triangles)] for part in model.primitives])
-    cameras = frame(bases, used, size, distance)
+    cameras = frame(bases, np.concatenate([part.positions for part in model.primitives]), size, distance)
     layers = _Layers(views, size)
     # Resolving and coding one view overlaps with drawing the next.
     with Capture(model, size, samples) as capture, ThreadPoolExecutor(1) as worker:
@@ -95,6 +97,7 @@ def bake_fan(
         "size": size,
         "perspective": None if np.isinf(distance) else distance,
         "samples": samples,
+        "up": up,
     }
     return layers.fan(model, layout, cameras, settings)
 
@@ -136,8 +139,8 @@ class _Layers:
         silhouette: NDArray[np.bool_] = self._color[..., 3] >= 128
         source = {"name": model.name, "sha256": model.source_hash}
         views = replace(views, plane=self._planes(views, silhouette))
-        normal = tuple(self._normal)
-        return Fan(model.name, layout, views, self._color, normal, self._depth, silhouette, source, settings)
+        normal, sphere = tuple(self._normal), (model.bounds, model.radius)
+        return Fan(model.name, layout, views, self._color, normal, self._depth, silhouette, source, settings, *sphere)
 
     def _planes(self, views: Views, silhouette: NDArray[np.bool_]) -> NDArray[np.float64]:
         """The plane (V, 3) nearest to each view's surface, by least squares over its texels."""

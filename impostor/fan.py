@@ -37,6 +37,10 @@ class Fan:
         `name` and `sha256` of what was baked.
     settings : dict
         What it was baked with, as the command line spells it.
+    bounds : ndarray, (2, 3) float64
+        Lowest and highest coordinates of the object, in metres; what the views frame if not given.
+    radius : float
+        From the middle of the bounds to the farthest point of the object: its bounding sphere.
     """
 
     name: str
@@ -48,6 +52,8 @@ class Fan:
     silhouette: NDArray[np.bool_]
     source: dict[str, str] = field(default_factory=dict)
     settings: dict[str, Any] = field(default_factory=dict)
+    bounds: NDArray[np.float64] = None  # type: ignore[assignment]
+    radius: float = 0.0
 
     def __post_init__(self):
         count, size = len(self.views), self.color.shape[1]
@@ -63,6 +69,14 @@ class Fan:
             if array.shape != shape or array.dtype != dtype:
                 found, wanted = f"{array.shape} {array.dtype}", f"{shape} {np.dtype(dtype)}"
                 raise SettingsError(self.name, f"layer {layer!r} is {found}; expected {wanted}")
+        if self.bounds is None:
+            reach = self.views.radius[:, None]
+            bounds = (self.views.center - reach).min(axis=0), (self.views.center + reach).max(axis=0)
+            object.__setattr__(self, "bounds", np.stack(bounds))
+        if self.radius == 0:
+            object.__setattr__(self, "radius", float(self.views.radius.max()))
+        if np.shape(self.bounds) != (2, 3):
+            raise SettingsError(self.name, f"bounds of shape {np.shape(self.bounds)}; expected (2, 3)")
         if not self.normal:
             raise SettingsError(self.name, "no normal layer; expected at least level 0")
 

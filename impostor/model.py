@@ -83,6 +83,12 @@ class Model:
         return sum(len(primitive.positions) for primitive in self.primitives)
 
     @cached_property
+    def radius(self) -> float:
+        """From the middle of the bounds to the farthest vertex, metres: the bounding sphere."""
+        middle = self.bounds.mean(axis=0)
+        return float(max(np.linalg.norm(part.positions - middle, axis=1).max() for part in self.primitives))
+
+    @cached_property
     def bounds(self) -> np.ndarray:
         """Least and greatest coordinates, (2, 3) float64, metres."""
         lows, highs = zip(*((p.positions.min(axis=0), p.positions.max(axis=0)) for p in self.primitives), strict=True)

@@ -26,6 +26,18 @@ class Camera:
     clip_from_view: NDArray[np.float64]
     view_from_world: NDArray[np.float64]
 
+    @property
+    def matrices(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Both, in the order in which the renderer's calls take them."""
+        return self.clip_from_view, self.view_from_world
+
+    def toward_eye(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Unit vector (3,) from a point toward the eye, world space."""
+        rotation, offset = self.view_from_world[:3, :3], self.view_from_world[:3, 3]
+        orthographic = self.clip_from_view[3, 3] == 1
+        toward = rotation[2] if orthographic else -rotation.T @ offset - point
+        return toward / np.linalg.norm(toward)
+
     @classmethod
     def perspective(
         cls,

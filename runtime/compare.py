@@ -58,14 +58,6 @@ class Pair:
     impostor: NDArray[np.uint8]
 
 
-def bounding_sphere(model: Model) -> tuple[NDArray[np.float64], float]:
-    """Centre (3,) of the bounding box, and the distance from it to the farthest vertex."""
-    center = model.bounds.mean(axis=0)
-    used = (part.positions[np.unique(part.triangles)] for part in model.primitives)
-    distances = [np.linalg.norm(positions - center, axis=1) for positions in used]
-    return center, float(np.concatenate(distances).max())
-
-
 def between_cameras(fan: Fan, count: int) -> list[float]:
     """Azimuths in radians, spread around the object, that lie between the fan's views at every fraction of the gap."""
     views = len(fan.views)
@@ -97,7 +89,7 @@ class Comparison:
         ambient: ArrayLike = DEFAULT_AMBIENT,
     ):
         size = fan.size if size is None else size
-        self._fan, self._sphere = fan, bounding_sphere(model)
+        self._fan, self._sphere = fan, (model.bounds.mean(axis=0), model.radius)
         self._fans, self._meshes = ImpostorRenderer(ctx), ImpostorRenderer(ctx)
         for renderer in (self._fans, self._meshes):
             renderer.lights, renderer.ambient = lights, ambient

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from paint import blade, mix, noise, ramp, rgb, to_bytes
 
@@ -61,7 +63,7 @@ def boards(width: int, height: int, seed: int, colors: tuple[str, ...]) -> np.nd
     return ramp(0.5 + grain, colors)
 
 
-def timber(image: np.ndarray, ends: list[tuple[float, float, float, float]], width: float, seed: int) -> None:
+def timber(image: np.ndarray, ends: Sequence[tuple[float, float, float, float]], width: float, seed: int) -> None:
     """Paint beams over a wall, in place; ends are x0, y0, x1, y1 in pixels."""
     h, w = image.shape[:2]
     y, x = np.mgrid[0:h, 0:w] + 0.5

@@ -69,20 +69,24 @@ class Sculpture:
         where, p = self.part(np.minimum(a, b) - margin, np.maximum(a, b) + margin)
         self.field[where] = soft_min(self.field[where], capsule(p, a, b, ra, rb), k)
 
-    def polygon(self, triangles: int, cut: np.ndarray, weights: Callable[[np.ndarray], np.ndarray]) -> Mesh:
-        """The surface at distance 0 where `cut` is negative, in at most so many triangles.
+    def polygon(self, low: float, high: float, triangles: int, weights: Callable[[np.ndarray], np.ndarray]) -> Mesh:
+        """The surface at distance 0 between two heights, open at both, in at most so many triangles.
 
         `weights` says how much the shape counts at (N, 3) places, see `decimate`.
         Its normals are the gradient of the uncut field, so that pieces cut from one figure shade alike at the joint.
         """
-        vertices, faces, _, _ = marching_cubes(np.maximum(self.field, cut), 0.0)
+        y = self.axes[1][None, :, None].astype(np.float32)
+        vertices, faces, _, _ = marching_cubes(np.maximum(self.field, np.maximum(low - y, y - high)), 0.0)
         rows = [np.arange(len(axis)) for axis in self.axes]
         points = np.stack([np.interp(vertices[:, k], rows[k], self.axes[k]) for k in range(3)], axis=-1)
         points, faces = largest(points, faces)
         points, faces = decimate(points, faces, triangles, weights(points))
         slope = np.stack([np.gradient(self.field, self.axes[k], axis=k) for k in range(3)], axis=-1)
         normals = unit(RegularGridInterpolator(self.axes, slope)(points))
-        return Mesh(points, normals, np.zeros((len(points), 2)), faces)
+
+        at_cut = (np.abs(points[:, 1, None] - (low, high)) < 1e-5).any(axis=1)
+        used, faces = np.unique(faces[~at_cut[faces].all(axis=1)], return_inverse=True)
+        return Mesh(points[used], normals[used], np.zeros((len(used), 2)), faces.reshape(-1, 3))
 
 
 def largest(points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -300,15 +300,14 @@ def staff() -> Mesh:
 
 
 def carve(axes: tuple[np.ndarray, np.ndarray, np.ndarray], low: float, high: float, triangles: int) -> Mesh:
-    """The figure between two heights, on a grid of its own, closed at the cuts."""
+    """The figure between two heights, on a grid of its own."""
     s = Sculpture(axes)
     robe(s)
     mantle(s)
     arms(s)
     head(s)
     feet(s)
-    y = axes[1][None, :, None].astype(np.float32)
-    return s.polygon(triangles, np.maximum(low - y, y - high), detail)
+    return s.polygon(low, high, triangles, detail)
 
 
 def make_statue(folder: Path) -> None:
@@ -318,10 +317,10 @@ def make_statue(folder: Path) -> None:
         (np.arange(-0.50, 0.40, 0.0068), np.arange(-0.03, 1.55, 0.0080), np.arange(-0.34, 0.42, 0.0068)),
         -0.012,
         cut,
-        46_000,
+        52_000,
     )
     fine = (np.arange(-0.13, 0.15, 0.0022), np.arange(1.47, 1.81, 0.0022), np.arange(-0.18, 0.16, 0.0022))
-    crown = carve(fine, cut - overlap, 2.0, 22_000)
+    crown = carve(fine, cut - overlap, 2.0, 25_000)
     shape = merge([merge([body, crown, staff()]).moved(y=DRUM), plinth()])
     glb = Glb("statue")
     marble = glb.add_material("marble", "#d9d3c6", roughness=0.65)

@@ -35,12 +35,14 @@ def pattern_fan(count=3, size=8, levels=4, distance=np.inf):
         radius=1 + steps / 9,
         depth_range=np.stack([-1 - steps / 13, 1 + steps / 17], axis=-1),
         distance=distance,
+        plane=np.stack([steps / 19, steps / 23, -steps / 29], axis=-1),
     )
     depth = texels(count, size, size, step=50021).astype(np.uint16)
     silhouette = color[..., 3] >= 128
     return Fan(
         "pattern", "ring", views, color, normal, depth, silhouette, {"name": "pattern.obj", "sha256": "0" * 64},
         {"views": count, "elevation": 14.5, "size": size, "up": "y", "perspective": None},
+        np.array([[-1, 0, -2.5], [1.5, 3, 0.25]]), 2.75,
     )  # fmt: skip
 
 
@@ -75,6 +77,8 @@ def assert_same_fan(found, expected):
     """Equal to the last bit, types included."""
     assert (found.name, found.layout) == (expected.name, expected.layout)
     assert (found.source, found.settings) == (expected.source, expected.settings)
+    np.testing.assert_array_equal(found.bounds, expected.bounds)
+    assert found.radius == expected.radius
     assert found.views.distance == expected.views.distance
     for key in ("basis", "center", "radius", "depth_range", "plane"):
         assert np.array_equal(getattr(found.views, key), getattr(expected.views, key)), key

@@ -103,6 +103,8 @@ def read_fan(path: FilePath) -> Fan:
         silhouette,
         manifest.source,
         manifest.settings,
+        np.array(manifest.bounds),
+        manifest.radius,
     )
 
 
@@ -178,6 +180,8 @@ def _manifest_fields(fan: Fan, shapes: list[LayerShape], images: list[bytes]) ->
         "size": fan.size,
         "columns": columns,
         "rows": rows,
+        "bounds": np.asarray(fan.bounds, float).tolist(),
+        "radius": float(fan.radius),
         "distance": None if distance == np.inf else distance,
         "views": [dict(zip(keys, camera, strict=True)) for camera in cameras],
         "layers": [

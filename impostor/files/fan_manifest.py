@@ -69,6 +69,10 @@ class Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     views : list of ViewEntry
     layers : list of LayerEntry
         Colour, normal levels, depth, silhouette: the order of the archive.
+    bounds : tuple
+        Lowest and highest coordinates of the object.
+    radius : float
+        Of the sphere around the middle of the bounds that holds the object.
     source : dict
         `name` and `sha256` of what was baked.
     settings : dict
@@ -86,6 +90,8 @@ class Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     distance: Annotated[float, Meta(gt=0)] | None
     views: Annotated[list[ViewEntry], Meta(min_length=1, max_length=MAX_VIEWS)]
     layers: Annotated[list[LayerEntry], Meta(min_length=4, max_length=3 + MAX_SIZE.bit_length())]
+    bounds: tuple[Vector, Vector]
+    radius: Annotated[float, Meta(gt=0)]
     source: dict[str, str]
     settings: dict[str, Any]
 
@@ -235,6 +241,8 @@ def _problems(manifest: Manifest) -> Iterator[str]:
         yield f"$.size: {count} views of {size} x {size} texels; expected at most {MAX_TEXELS} texels in all"
     if not (rows - 1) * columns < count <= rows * columns:
         yield f"$.columns, $.rows: {columns} x {rows} tiles; expected {count} views, and no empty row"
+    if any(low > high for low, high in zip(*manifest.bounds, strict=True)):
+        yield f"$.bounds: {list(map(list, manifest.bounds))}; expected the lowest coordinates first"
     yield from _layer_problems(manifest)
     yield from _camera_problems(manifest.cameras())
 

@@ -25,7 +25,12 @@ def fans(draw):
     distance = draw(st.one_of(st.just(np.inf), st.floats(depth_range.max() + 4, 1e9)))
     center = np.array(draw(st.lists(finite, min_size=3 * count, max_size=3 * count))).reshape(count, 3)
     views = Views(
-        basis_facing(rng.normal(size=(count, 3))), center, rng.uniform(1e-6, 1e6, count), depth_range, distance
+        basis_facing(rng.normal(size=(count, 3))),
+        center,
+        rng.uniform(1e-6, 1e6, count),
+        depth_range,
+        distance,
+        rng.normal(size=(count, 3)) - 4,
     )
     color = rng.integers(0, 256, (count, size, size, 4), np.uint8)
     levels = range(draw(st.integers(1, size.bit_length())))

@@ -1,0 +1,85 @@
+"""`impostor bake`."""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from impostor.cli import Force, Quiet, UpAxis, progress_bar
+
+
+def register(app: typer.Typer) -> None:
+    """Add this stage's commands."""
+    app.command("bake")(bake)
+
+
+def bake(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="GLB, glTF, OBJ, PLY, STL, OFF, 3MF or COLLADA.")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.fan")],
+    views: Annotated[int, typer.Option(help="Number of cameras.")] = 96,
+    elevation: Annotated[float, typer.Option(metavar="DEG", help="Of a ring of cameras.")] = 15.0,
+    layout: Annotated[str, typer.Option(metavar="ring|hemisphere|sphere")] = "ring",
+    size: Annotated[int, typer.Option(metavar="TEXELS", help="Side of a tile.")] = 256,
+    perspective: Annotated[
+        float | None, typer.Option(metavar="DIST", help="Metres to a perspective camera; orthographic if left out.")
+    ] = None,
+    samples: Annotated[
+        int | None, typer.Option(metavar="1|2|4", help="Samples along a texel's side; 4 for textures, else 2.")
+    ] = None,
+    up: UpAxis = "y",
+    picture: Annotated[
+        Path | None, typer.Option(metavar="PNG", help="Also write the layers of eight views as a picture.")
+    ] = None,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Bake a model into a fan: colour, depth, normal codes and silhouette from a circle of cameras."""
+    from impostor.errors import SettingsError
+    from impostor.fan import MAX_SIZE, MIN_SIZE
+    from impostor.files.output import check_output
+    from impostor.views import layout_bases
+
+    started = time.monotonic()
+    # All that can be refused without the model is refused before it is loaded.
+    for path in (output, picture):
+        if path is not None:
+            check_output(path, force)
+    layout_bases(layout, views, math.radians(elevation))
+    if not MIN_SIZE <= size <= MAX_SIZE:
+        raise SettingsError("--size", f"{size} texels; expected {MIN_SIZE} to {MAX_SIZE}")
+    if samples not in (None, 1, 2, 4):
+        raise SettingsError("--samples", f"{samples}; expected 1, 2 or 4")
+
+    from impostor.files.fan_file import write_fan
+    from impostor.model import load_model
+
+    mesh = load_model(model, up=up)
+    from bake.fan import bake_fan
+
+    with progress_bar(f"baking {model.name}", quiet) as progress:
+        fan = bake_fan(
+            mesh,
+            views=views,
+            elevation_deg=elevation,
+            layout=layout,
+            size=size,
+            distance=float("inf") if perspective is None else perspective,
+            samples=samples,
+            up=up,
+            progress=progress,
+        )
+    written = write_fan(output, fan, force)
+    if picture is not None:
+        from impostor.summary import write_contact_sheet
+
+        write_contact_sheet(fan, picture, force)
+    if not quiet:
+        per_texel = written / max(fan.covered_texels, 1)
+        typer.echo(
+            f"{model} ({mesh.triangle_count:,} triangles) -> {output} ({views} views of {size}x{size}, "
+            f"{written / 1e6:.1f} MB, {per_texel:.2f} bytes a covered texel) in {time.monotonic() - started:.1f} s"
+        )

@@ -1,0 +1,163 @@
+"""The `impostor` command: assembles the stages' commands, and turns every problem into one line."""
+
+from __future__ import annotations
+
+import json
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from impostor.errors import ImpostorError, ModelWarning
+
+EPILOG = "Exit codes: 0 done, 1 failed, 2 wrong usage. Angles are in degrees, azimuth from +Z toward +X."
+
+Force = Annotated[bool, typer.Option("--force", help="Replace the output if it exists.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="No progress bar and no summary.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+UpAxis = Annotated[str, typer.Option("--up", metavar="y|z", help="The model file's up axis.")]
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run one command.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        What follows the program's name; the process's own if not given.
+
+    Returns
+    -------
+    int
+        The exit code.
+    """
+    warnings.showwarning = warn
+    warnings.simplefilter("ignore")
+    warnings.simplefilter("always", ModelWarning)
+    try:
+        return typer.main.get_command(make_app()).main(arguments, "impostor", standalone_mode=False) or 0
+    except ImpostorError as error:
+        return _fail(str(error), 1)
+    except typer.TyperException as error:
+        return _fail(f"{' '.join(error.format_message().split())} (see impostor --help)", 2)
+    except (KeyboardInterrupt, typer.Abort):
+        return _fail("stopped", 130)
+    except MemoryError:
+        return _fail("not enough memory; expected room for all views: a smaller --size or fewer --views take less", 1)
+    except BrokenPipeError:
+        sys.stderr.close()  # whoever read our output has gone
+        return 1
+    except OSError as error:
+        return _fail(f"{error.filename or 'system'}: {error.strerror or error}", 1)
+
+
+def make_app() -> typer.Typer:
+    """Every command of every installed stage."""
+    app = typer.Typer(
+        add_completion=False,
+        no_args_is_help=True,
+        rich_markup_mode=None,
+        epilog=EPILOG,
+        pretty_exceptions_enable=False,
+        help="Bake any mesh into a fan of small images; draw it as one quad, relight it live, cast its shadow.",
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    stages = sorted(entry_points(group="impostor.commands"), key=lambda stage: stage.name)
+    for stage in stages:
+        stage.load()(app)
+    app.command("info")(info)
+    app.command("validate")(validate)
+    return app
+
+
+def info(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A .fan, or a model.")],
+    as_json: AsJson = False,
+    picture: Annotated[Path | None, typer.Option(help="Write the layers of eight views as a PNG.")] = None,
+    up: UpAxis = "y",
+    force: Force = False,
+) -> None:
+    """Say what is in a fan or a model."""
+    if file.suffix.lower() == ".fan":
+        from impostor.summary import fan_summary
+
+        summary = fan_summary(file)
+        if picture is not None:
+            from impostor.files.fan_file import read_fan
+            from impostor.files.output import check_output
+            from impostor.summary import write_contact_sheet
+
+            check_output(picture, force)
+            write_contact_sheet(read_fan(file), picture, force)
+    else:
+        from impostor.summary import model_summary
+
+        if picture is not None:
+            raise typer.BadParameter(f"{file} is not a .fan; expected one")
+        summary = model_summary(file, up)
+    print_summary(summary, as_json)
+
+
+def validate(files: Annotated[list[Path], typer.Argument(metavar="FILE...", help=".fan files.")]) -> None:
+    """Check everything that must hold in fans; prints a line for each problem."""
+    from impostor.files.fan_file import validate_fan
+
+    problems = 0
+    for file in files:
+        found = validate_fan(file)
+        problems += len(found)
+        for line in found:
+            print(line, file=sys.stderr)
+        if not found:
+            print(f"{file}: sound")
+    if problems:
+        raise typer.Exit(1)
+
+
+def print_summary(summary: dict[str, Any], as_json: bool) -> None:
+    """Print a flat mapping as JSON, or as one aligned line an entry."""
+    if as_json:
+        print(json.dumps(summary, indent=2))
+        return
+    width = max(map(len, summary))
+    for key, value in summary.items():
+        text = ", ".join(map(str, value)) if isinstance(value, list) else value
+        print(f"{key.replace('_', ' '):{width}}  {'-' if text is None else text}")
+
+
+@contextmanager
+def progress_bar(label: str, quiet: bool = False) -> Iterator[Callable[[int, int], None]]:
+    """A function to call with steps done and steps in all, which draws a bar on standard error.
+
+    Silent when told so, and where standard error is not a terminal.
+    """
+    if quiet or not sys.stderr.isatty():
+        yield lambda done, total: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(label, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def warn(message: object, *_: Any, **__: Any) -> None:
+    """Print one line about something that the user may not expect."""
+    print(f"impostor: warning: {' '.join(str(message).split())}", file=sys.stderr)
+
+
+def _fail(message: str, code: int) -> int:
+    print(f"impostor: {message}", file=sys.stderr)
+    return code
+
+
+def run() -> None:
+    """The console script."""
+    sys.exit(main())

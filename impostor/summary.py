@@ -1,0 +1,84 @@
+"""What a person wants to know of a fan or a model at a glance."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from impostor.fan import Fan
+from impostor.files.fan_file import read_fan, read_manifest
+from impostor.files.output import atomic_output
+from impostor.model import load_model
+from impostor.normal_code import palette
+
+SHEET_VIEWS = 8
+
+
+def fan_summary(path: Path) -> dict[str, Any]:
+    """A flat description of a `.fan` file, ready for JSON."""
+    manifest = read_manifest(path)
+    fan = read_fan(path)
+    size = path.stat().st_size
+    albedo = fan.uniform_albedo
+    return {
+        "file": str(path),
+        "bytes": size,
+        "name": manifest.name,
+        "format_version": manifest.version,
+        "layout": manifest.layout,
+        "views": len(manifest.views),
+        "tile_size": manifest.size,
+        "normal_levels": len(fan.normal),
+        "camera": "orthographic" if manifest.distance is None else f"perspective at {manifest.distance:g} m",
+        "bounds_m": [f"{low:.4g} to {high:.4g}" for low, high in fan.bounds.T],
+        "texel_m": round(2 * float(fan.views.radius[0]) / fan.size, 6),
+        "covered_texels": fan.covered_texels,
+        "bytes_per_covered_texel": round(size / max(fan.covered_texels, 1), 3),
+        "uniform_albedo": None if albedo is None else "#{:02x}{:02x}{:02x}".format(*albedo),
+        "source": manifest.source.get("name"),
+        "source_sha256": manifest.source.get("sha256"),
+        "settings": [f"{key} {value}" for key, value in sorted(manifest.settings.items()) if value is not None],
+        "written_by": manifest.tool,
+    }
+
+
+def model_summary(path: Path, up: str = "y") -> dict[str, Any]:
+    """A flat description of a model file, ready for JSON."""
+    model = load_model(path, up=up)
+    textures = {id(part.material.texture): part.material.texture for part in model.primitives}
+    sizes = [f"{t.shape[1]}x{t.shape[0]}" for t in textures.values() if t is not None]
+    return {
+        "file": str(path),
+        "bytes": path.stat().st_size,
+        "name": model.name,
+        "triangles": model.triangle_count,
+        "vertices": model.vertex_count,
+        "materials": [f"{part.material.name} ({part.material.alpha_mode.lower()})" for part in model.primitives],
+        "textures": sizes,
+        "vertex_colors": any(part.colors is not None for part in model.primitives),
+        "bounds_m": [f"{low:.4g} to {high:.4g}" for low, high in model.bounds.T],
+        "radius_m": round(model.radius, 6),
+        "sha256": model.source_hash,
+    }
+
+
+def contact_sheet(fan: Fan) -> NDArray[np.uint8]:
+    """Colour, normals, depth and silhouette, a row each, of eight views around: (4 S, 8 S, 3) uint8."""
+    chosen = np.linspace(0, len(fan.views), min(SHEET_VIEWS, len(fan.views)), endpoint=False).astype(int)
+    alpha = fan.color[chosen, ..., 3:].astype(np.float32) / 255
+    color = fan.color[chosen, ..., :3] * alpha + 128 * (1 - alpha)
+    normal = palette()[fan.normal[0][chosen]]
+    depth = np.repeat(fan.depth[chosen, ..., None] >> 8, 3, axis=-1)
+    silhouette = np.repeat(fan.silhouette[chosen, ..., None] * 255, 3, axis=-1)
+    rows = [np.hstack(list(layer.astype(np.uint8))) for layer in (color, normal, depth, silhouette)]
+    return np.vstack(rows)
+
+
+def write_contact_sheet(fan: Fan, path: Path, force: bool = False) -> None:
+    """Write `contact_sheet` as a PNG, all of it or nothing."""
+    with atomic_output(path, force=force) as temporary:
+        Image.fromarray(contact_sheet(fan)).save(temporary, format="PNG")

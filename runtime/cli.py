@@ -1,0 +1,190 @@
+"""`impostor render` and `impostor compare`."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from impostor.cli import AsJson, Force, Quiet, UpAxis, progress_bar
+from impostor.errors import SettingsError
+
+if TYPE_CHECKING:
+    from impostor.fan import Fan
+    from impostor.lighting import DirectionalLight
+    from impostor.model import Model
+
+METHODS = ("nearest",)
+MAX_SIDE = 16384
+
+Lights = Annotated[
+    list[str] | None, typer.Option("--light", metavar="AZ,EL[,R,G,B]", help="A directional light; repeatable.")
+]
+Method = Annotated[str, typer.Option(metavar="nearest", help="How views between the views are made.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add this stage's commands."""
+    app.command("render")(render)
+    app.command("compare")(compare)
+
+
+def render(
+    subject: Annotated[Path, typer.Argument(metavar="FAN|MODEL")],
+    output_file: Annotated[Path, typer.Option("-o", metavar="OUT.png")],
+    size: Annotated[str, typer.Option(metavar="WxH")] = "512x512",
+    azimuth: Annotated[float, typer.Option(metavar="DEG", help="Of an orthographic camera.")] = 0.0,
+    elevation: Annotated[float, typer.Option(metavar="DEG")] = 15.0,
+    eye: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Of a perspective camera.")] = None,
+    target: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="The object's middle if left out.")] = None,
+    fov: Annotated[float, typer.Option(metavar="DEG", help="Vertical field of view.")] = 40.0,
+    light: Lights = None,
+    ambient: Annotated[float | None, typer.Option(metavar="A", help="Linear light that reaches everything.")] = None,
+    gloss: Annotated[str | None, typer.Option(metavar="STRENGTH,SHININESS", help="A highlight.")] = None,
+    method: Method = "nearest",
+    output: Annotated[str, typer.Option(metavar="lit|albedo|normal|depth|alpha")] = "lit",
+    no_shadow: Annotated[bool, typer.Option("--no-shadow", help="No ground and no shadow.")] = False,
+    background: Annotated[
+        str | None, typer.Option(metavar="R,G,B|transparent", help="sRGB, 0 to 1, behind a lit picture.")
+    ] = None,
+    up: UpAxis = "y",
+    force: Force = False,
+) -> None:
+    """Draw a fan, or a mesh through the same camera and lights, as a PNG."""
+    from impostor.files.output import check_output
+    from impostor.lighting import Gloss
+    from runtime.gpu import make_context
+    from runtime.offscreen import save_png
+    from runtime.pictures import PictureSettings, draw_picture, eye_camera, orbit_camera
+
+    width, height = _size(size)
+    _check_method(method)
+    options = {}
+    if light:
+        options["lights"] = tuple(_light(text) for text in light)
+    if ambient is not None:
+        if not 0 <= ambient < math.inf:
+            raise SettingsError("--ambient", f"{ambient:g}; expected a number of at least 0")
+        options["ambient"] = ambient
+    if gloss is not None:
+        options["gloss"] = Gloss(*_numbers("--gloss", gloss, 2))
+    if background == "transparent":
+        options["background"] = (0.0, 0.0, 0.0, 0.0)
+    elif background is not None:
+        options["background"] = (*_numbers("--background", background, 3), 1.0)
+    settings = PictureSettings(width, height, output=output, shadow=not no_shadow, **options)
+    check_output(output_file, force)
+    loaded = _load(subject, up)
+    if eye is None:
+        if target is not None:
+            raise SettingsError("--target", f"{target} without --eye; expected both, or --azimuth and --elevation")
+        if not abs(elevation) <= 90 or not math.isfinite(azimuth):
+            raise SettingsError("--elevation", f"{elevation:g} degrees; expected -90 to 90 (azimuth {azimuth:g})")
+        camera = orbit_camera(loaded, math.radians(azimuth), math.radians(elevation), width / height)
+    else:
+        aim = loaded.bounds.mean(axis=0) if target is None else _numbers("--target", target, 3)
+        camera = eye_camera(loaded, _numbers("--eye", eye, 3), aim, fov, width / height)
+    save_png(output_file, draw_picture(make_context(), loaded, camera, settings), force=force)
+
+
+def compare(
+    fan_file: Annotated[Path, typer.Argument(metavar="FAN")],
+    model_file: Annotated[Path, typer.Argument(metavar="MODEL")],
+    as_json: AsJson = False,
+    offsets: Annotated[
+        str, typer.Option(metavar="DEG,...", help="Camera elevations relative to the fan's.")
+    ] = "0,5,10,20,35",
+    cameras: Annotated[int, typer.Option(help="Cameras around the object, all between baked views.")] = 8,
+    method: Method = "nearest",
+    size: Annotated[int | None, typer.Option(metavar="PIXELS", help="Side of the pictures; the tiles' side.")] = None,
+    light: Lights = None,
+    picture: Annotated[
+        Path | None, typer.Option(metavar="PNG", help="Write mesh, impostor and difference side by side.")
+    ] = None,
+    up: Annotated[str | None, typer.Option(metavar="y|z", help="As the fan was baked if left out.")] = None,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Measure a fan against its mesh from cameras between the baked views."""
+    from impostor.cli import warn
+    from impostor.files.fan_file import read_fan
+    from impostor.files.output import check_output
+    from impostor.model import load_model
+    from runtime.compare import Comparison, side_by_side
+    from runtime.compare import as_json as rows_as_json
+    from runtime.gpu import make_context
+    from runtime.offscreen import save_png
+    from runtime.renderer import DEFAULT_LIGHTS
+
+    _check_method(method)
+    angles = _numbers("--offsets", offsets)
+    if not 1 <= cameras <= 360:
+        raise SettingsError("--cameras", f"{cameras}; expected 1 to 360")
+    if size is not None and not 16 <= size <= 4096:
+        raise SettingsError("--size", f"{size} pixels; expected 16 to 4096")
+    lights = tuple(_light(text) for text in light) if light else DEFAULT_LIGHTS
+    if picture is not None:
+        check_output(picture, force)
+    fan = read_fan(fan_file)
+    model = load_model(model_file, up=up or str(fan.settings.get("up", "y")))
+    if fan.source.get("sha256") not in (None, model.source_hash):
+        warn(f"{model_file} is not the file that {fan_file} was baked from ({fan.source.get('name')})")
+    comparison = Comparison(make_context(), fan, model, size, lights)
+    try:
+        with progress_bar("comparing", quiet) as progress:
+            measured = list(comparison.rows(angles, cameras, method, progress))
+    finally:
+        comparison.release()
+    rows = [row for row, _ in measured]
+    if picture is not None:
+        save_png(picture, side_by_side([pair for _, pair in measured]), force=force)
+    if as_json:
+        print(json.dumps(rows_as_json(rows), indent=2))
+        return
+    print(f"{'method':10} {'offset':>7} {'PSNR dB':>8} {'SSIM':>7} {'FLIP':>7} {'IoU':>7}")
+    for row in rows:
+        values = f"{row.psnr_db:8.2f} {row.ssim:7.4f} {row.flip:7.4f} {row.iou:7.4f}"
+        print(f"{row.method:10} {row.offset_deg:7g} {values}")
+
+
+def _load(path: Path, up: str) -> Fan | Model:
+    if path.suffix.lower() == ".fan":
+        from impostor.files.fan_file import read_fan
+
+        return read_fan(path)
+    from impostor.model import load_model
+
+    return load_model(path, up=up)
+
+
+def _check_method(method: str) -> None:
+    if method not in METHODS:
+        raise SettingsError("--method", f"{method!r}; expected one of {', '.join(METHODS)}")
+
+
+def _numbers(flag: str, text: str, *counts: int) -> list[float]:
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if not values or not all(map(math.isfinite, values)) or (counts and len(values) not in counts):
+        wanted = " or ".join(map(str, counts)) or "one or more"
+        raise SettingsError(flag, f"{text!r}; expected {wanted} finite numbers between commas")
+    return values
+
+
+def _light(text: str) -> DirectionalLight:
+    from impostor.lighting import DirectionalLight
+
+    azimuth, elevation, *color = _numbers("--light", text, 2, 5)
+    return DirectionalLight.from_angles(azimuth, elevation, color or (0.75, 0.75, 0.75))
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.lower().partition("x")
+    if not (width.isdigit() and height.isdigit() and 1 <= int(width) <= MAX_SIDE and 1 <= int(height) <= MAX_SIDE):
+        raise SettingsError("--size", f"{text!r}; expected WIDTHxHEIGHT in pixels, such as 640x480, at most {MAX_SIDE}")
+    return int(width), int(height)

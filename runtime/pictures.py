@@ -1,0 +1,141 @@
+"""One picture of one object: a fan or its mesh, the same camera, lights and ground for both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from impostor.errors import SettingsError
+from impostor.fan import Fan
+from impostor.lighting import DirectionalLight, Gloss
+from impostor.model import Model
+from impostor.shadow_projection import Ground
+from runtime.cameras import Camera
+from runtime.grounds import GroundSurface
+from runtime.offscreen import Offscreen
+from runtime.renderer import DEFAULT_AMBIENT, DEFAULT_LIGHTS, ImpostorRenderer
+
+OUTPUTS = ("lit", "albedo", "normal", "depth", "alpha")
+MESH_SAMPLES = 4
+GROUND_ALBEDO = (0.55, 0.54, 0.5)
+GROUND_REACH = 12  # bounding radii
+
+
+@dataclass(frozen=True)
+class PictureSettings:
+    """How to draw a picture.
+
+    Parameters
+    ----------
+    width, height : int
+        Pixels.
+    lights, ambient
+        As `ImpostorRenderer` takes them.
+    gloss : Gloss
+    output : {"lit", "albedo", "normal", "depth", "alpha"}
+        Only a lit picture has a ground. Depth is grey: white at the near end of the bounding sphere, black at its far
+        end and where there is nothing.
+    shadow : bool
+        Whether a lit picture has a ground with the object's shadow on it.
+    background : tuple of float
+        sRGB and alpha, premultiplied.
+    """
+
+    width: int = 512
+    height: int = 512
+    lights: Sequence[DirectionalLight] = DEFAULT_LIGHTS
+    ambient: ArrayLike = DEFAULT_AMBIENT
+    gloss: Gloss = Gloss()  # noqa: RUF009 - frozen
+    output: str = "lit"
+    shadow: bool = True
+    background: tuple[float, float, float, float] = (0.72, 0.76, 0.80, 1.0)
+
+    def __post_init__(self):
+        if self.output not in OUTPUTS:
+            raise SettingsError("--output", f"{self.output!r}; expected one of {', '.join(OUTPUTS)}")
+
+
+def orbit_camera(subject: Fan | Model, azimuth: float, elevation: float, aspect: float) -> Camera:
+    """The orthographic camera that frames the object's bounding sphere; angles in radians."""
+    return Camera.orthographic(subject.bounds.mean(axis=0), subject.radius, azimuth, elevation, aspect)
+
+
+def eye_camera(subject: Fan | Model, eye: ArrayLike, target: ArrayLike, fov_deg: float, aspect: float) -> Camera:
+    """A perspective camera whose range holds the object and the ground around it."""
+    distance = float(np.linalg.norm(np.asarray(eye, float) - subject.bounds.mean(axis=0)))
+    near = max((distance - 1.1 * subject.radius) / 2, 0.01 * subject.radius)
+    return Camera.perspective(eye, target, fov_deg, aspect, near, distance + 2 * GROUND_REACH * subject.radius)
+
+
+def draw_picture(
+    ctx: moderngl.Context, subject: Fan | Model, camera: Camera, settings: PictureSettings
+) -> NDArray[np.uint8]:
+    """Draw a fan or a mesh.
+
+    Parameters
+    ----------
+    ctx : moderngl.Context
+    subject : Fan or Model
+        The same call with the one or the other aligns to the pixel.
+    camera : Camera
+    settings : PictureSettings
+
+    Returns
+    -------
+    ndarray, (H, W, 4) uint8
+        sRGB, premultiplied; (H, W) for depth and alpha.
+
+    Raises
+    ------
+    GpuError
+        The GPU cannot hold a picture of that size.
+    """
+    target = Offscreen(ctx, settings.width, settings.height, MESH_SAMPLES if isinstance(subject, Model) else 1)
+    renderer = ImpostorRenderer(ctx)
+    try:
+        renderer.lights, renderer.ambient = settings.lights, settings.ambient
+        if isinstance(subject, Model):
+            renderer.add_mesh(subject, gloss=settings.gloss)
+        else:
+            renderer.add(subject, gloss=settings.gloss)
+        lit = settings.output == "lit"
+        target.clear(settings.background if lit else (0.0, 0.0, 0.0, 0.0))
+        if lit and settings.shadow:
+            _draw_ground(renderer, subject, camera, settings)
+        shown = settings.output if settings.output in ("albedo", "normal") else "lit"
+        renderer.draw_meshes(*camera.matrices, shown)
+        renderer.draw(*camera.matrices, shown)
+        if settings.output == "depth":
+            return _depth_picture(target.depth(), subject, camera)
+        return target.color()[..., 3] if settings.output == "alpha" else target.color()
+    finally:
+        renderer.release()
+        target.release()
+
+
+def _draw_ground(renderer: ImpostorRenderer, subject: Fan | Model, camera: Camera, settings: PictureSettings) -> None:
+    low, high = subject.bounds
+    middle = (float((low[0] + high[0]) / 2), float(low[1]), float((low[2] + high[2]) / 2))
+    ground = Ground(np.array([0.0, 1.0, 0.0]), low[1])
+    if camera.toward_eye(np.array(middle))[1] <= 0:
+        return
+    reach = GROUND_REACH * subject.radius
+    surface = GroundSurface(GROUND_ALBEDO, middle=middle, reach=reach, background=settings.background)
+    renderer.draw_ground(*camera.matrices, ground, surface)
+    renderer.draw_shadows(*camera.matrices, ground)
+
+
+def _depth_picture(depth: NDArray[np.float32], subject: Fan | Model, camera: Camera) -> NDArray[np.uint8]:
+    ndc = depth.astype(float) * 2 - 1
+    projection = camera.clip_from_view
+    if projection[3, 3] == 1:
+        z = (ndc - projection[2, 3]) / projection[2, 2]
+    else:
+        z = -projection[2, 3] / (ndc + projection[2, 2])
+    middle = camera.view_from_world[:3] @ np.append(subject.bounds.mean(axis=0), 1.0)
+    nearness = 0.5 + (z - middle[2]) / (2 * subject.radius)
+    return np.rint(np.where(depth < 1, np.clip(nearness, 0, 1), 0) * 255).astype(np.uint8)
