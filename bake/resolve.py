@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from impostor.model_materials import linear_from_srgb, srgb_from_linear
+from impostor.srgb import linear_from_srgb, srgb_from_linear
 from impostor.views import View
 
 CLIFF_TEXELS = 2.0  # samples further than this behind the nearest one of their texel belong to another surface

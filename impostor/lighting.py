@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -123,15 +123,3 @@ def colormap(
         highlight = np.maximum(np.einsum("ni,...li->...nl", normals, half), 0) ** gloss.shininess * (facing > 0)
         specular[..., :225, :] = gloss.strength * (highlight @ color)
     return Colormap(diffuse, specular)
-
-
-def srgb_from_linear(linear: ArrayLike) -> NDArray[Any]:
-    """Linear light to the sRGB curve, clipped to 0..1; dtype kept for floating arrays (IEC 61966-2-1)."""
-    linear = np.clip(linear, 0, 1)
-    return np.where(linear <= 0.0031308, linear * 12.92, 1.055 * linear ** (1 / 2.4) - 0.055)
-
-
-def linear_from_srgb(srgb: ArrayLike) -> NDArray[Any]:
-    """The sRGB curve (0..1) to linear light (IEC 61966-2-1)."""
-    srgb = np.asarray(srgb)
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from impostor.errors import ModelError, SettingsError
-from impostor.model_checks import CHECKS, prepared
-from impostor.model_files import ModelFiles
-from impostor.model_gltf_scene import read_gltf
-from impostor.model_import import imported_parts
-from impostor.model_materials import Material
-from impostor.model_parts import MOST_TRIANGLES, Part, checked, finished_part, joined
+from impostor.importing.checks import CHECKS, prepared
+from impostor.importing.gltf_scene import read_gltf
+from impostor.importing.materials import Material
+from impostor.importing.mesh_parts import imported_parts
+from impostor.importing.parts import MOST_TRIANGLES, Part, checked, finished_part, joined
+from impostor.importing.sources import ModelFiles
 
 __all__ = ["SUFFIXES", "Material", "Model", "Primitive", "load_model"]
 

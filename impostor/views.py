@@ -277,7 +277,7 @@ def frame(
     middle = (points.min(axis=0).astype(float) + points.max(axis=0)) / 2
     points = _outermost(np.asarray(points, np.float32) - middle.astype(np.float32))
     reach = float(np.sqrt(np.einsum("ij,ij->i", points, points).max())) or 1.0
-    if distance <= reach * 1.05:
+    if not distance > reach * 1.05:
         raise SettingsError("--perspective", f"{distance:g} m; expected more than {reach * 1.05:.4g} m for this object")
     low, high = np.empty((2, len(bases), 3))
     for index, basis in enumerate(bases.astype(np.float32)):

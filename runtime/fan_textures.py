@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from impostor.fan import Fan
 from impostor.files.fan_manifest import atlas_grid
-from impostor.lighting import linear_from_srgb, srgb_from_linear
+from impostor.srgb import linear_from_srgb, srgb_from_linear
 from runtime.gpu import SRGB8_ALPHA8, check_texture_size, tiles_to_atlas
 
 LINEAR_FROM_BYTE = linear_from_srgb(np.arange(256) / 255).astype(np.float32)

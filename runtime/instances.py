@@ -49,7 +49,8 @@ class Instances:
         gloss: Gloss | None = None,
     ):
         self.fan, self.gloss = fan, gloss or Gloss()
-        self.positions = np.array(np.atleast_2d(np.asarray(positions, float)))
+        given = np.asarray(positions, float)
+        self.positions = np.array(np.atleast_2d(given) if given.size else given.reshape(0, 3))
         count = len(self.positions)
         if self.positions.shape != (count, 3):
             raise SettingsError(fan.name, f"positions of shape {self.positions.shape}; expected (N, 3)")

@@ -73,8 +73,9 @@ class Offscreen:
 
     def release(self) -> None:
         """Free the buffers."""
-        if self._ctx.fbo is self.framebuffer and self._ctx.screen is not None:
-            self._ctx.screen.use()
+        if self._ctx.fbo is self.framebuffer:
+            # moderngl would go on binding the released one.
+            (self._ctx.screen or self._ctx.detect_framebuffer(0)).use()
         for resource in (self.framebuffer, self._color, self._depth):
             resource.release()
 

@@ -84,7 +84,7 @@ class Sculpture:
         slope = np.stack([np.gradient(self.field, self.axes[k], axis=k) for k in range(3)], axis=-1)
         normals = unit(RegularGridInterpolator(self.axes, slope)(points))
 
-        at_cut = (np.abs(points[:, 1, None] - (low, high)) < 1e-5).any(axis=1)
+        at_cut = np.any(np.abs(points[:, 1, None] - (low, high)) < 1e-5, axis=1)
         used, faces = np.unique(faces[~at_cut[faces].all(axis=1)], return_inverse=True)
         return Mesh(points[used], normals[used], np.zeros((len(used), 2)), faces.reshape(-1, 3))
 

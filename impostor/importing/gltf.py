@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from impostor.errors import ModelError
-from impostor.model_files import ModelFiles
+from impostor.importing.sources import ModelFiles
 
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from impostor.errors import ModelError
-from impostor.model_files import ModelFiles
-from impostor.model_materials import warn
+from impostor.importing.materials import warn
+from impostor.importing.sources import ModelFiles
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",

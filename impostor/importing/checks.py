@@ -19,10 +19,10 @@ import numpy as np
 from lxml import etree  # type: ignore[attr-defined]
 
 from impostor.errors import ModelError
-from impostor.model_files import ModelFiles, utf8
-from impostor.model_materials import warn
-from impostor.model_parts import MOST_TRIANGLES
-from impostor.model_ply import readable_ply
+from impostor.importing.materials import warn
+from impostor.importing.parts import MOST_TRIANGLES
+from impostor.importing.ply import readable_ply
+from impostor.importing.sources import ModelFiles, utf8
 
 _MOST_INSTANCES = 1_000_000
 _MOST_UNZIPPED = 2 << 30

@@ -14,19 +14,19 @@ from typing import Any
 import numpy as np
 
 from impostor.errors import ModelError
-from impostor.model_checks import Prepared, obj_index_problem
-from impostor.model_files import ModelFiles
-from impostor.model_materials import (
+from impostor.importing.checks import Prepared, obj_index_problem
+from impostor.importing.materials import (
     Material,
     decode_texture,
     finished,
-    linear_from_srgb,
     pixels,
     read_mtl,
     warn,
     with_alpha_mode,
 )
-from impostor.model_parts import Part
+from impostor.importing.parts import Part
+from impostor.importing.sources import ModelFiles
+from impostor.srgb import linear_from_srgb
 
 _GREY = (0.8, 0.8, 0.8, 1.0)
 _WHITE = (1.0, 1.0, 1.0, 1.0)

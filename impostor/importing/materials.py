@@ -11,12 +11,13 @@ from PIL import Image
 from scipy.ndimage import distance_transform_edt
 
 from impostor.errors import ModelError, ModelWarning
-from impostor.model_files import ModelFiles, utf8
+from impostor.importing.sources import ModelFiles, utf8
+from impostor.srgb import linear_from_srgb
 
 LARGEST_TEXTURE = 16384
 _KTX2_MAGIC = b"\xabKTX 20\xbb"
 _ALPHA_IS_OPAQUE = 250
-_BINARY_SHARE = 0.1
+_BINARY_SHARE = 0.2
 _MTL_OPTION_VALUES = {
     "-blendu": 1, "-blendv": 1, "-bm": 1, "-boost": 1, "-cc": 1, "-clamp": 1,
     "-imfchan": 1, "-mm": 2, "-o": 3, "-s": 3, "-t": 3, "-texres": 1, "-type": 1,
@@ -46,18 +47,6 @@ class Material:
     alpha_mode: str = "OPAQUE"
     alpha_cutoff: float = 0.5
     double_sided: bool = True
-
-
-def srgb_from_linear(linear):
-    """sRGB transfer function, 0..1 to 0..1."""
-    linear = np.clip(linear, 0.0, 1.0)
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-
-
-def linear_from_srgb(srgb):
-    """Inverse of `srgb_from_linear`."""
-    srgb = np.clip(srgb, 0.0, 1.0)
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
 
 def warn(files: ModelFiles, problem: str) -> None:
@@ -118,7 +107,7 @@ def pixels(image: Image.Image) -> np.ndarray:
 def with_alpha_mode(material: Material) -> Material:
     """OPAQUE, MASK or BLEND from the alpha itself, for formats that do not say which.
 
-    MASK when fewer than a tenth of the texels are neither covered nor clear, else BLEND.
+    MASK when fewer than a fifth of the texels are neither covered nor clear, else BLEND.
     """
     factor = material.base_color[3]
     alpha = np.full(1, 255, np.uint8) if material.texture is None else material.texture[..., 3]

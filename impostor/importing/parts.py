@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from impostor.errors import ModelError
-from impostor.model_materials import Material
-from impostor.model_normals import agreeing_winding, computed_normals, face_vectors, repaired_normals, weld
+from impostor.importing.materials import Material
+from impostor.importing.normals import agreeing_winding, computed_normals, face_vectors, repaired_normals, weld
 
 MOST_TRIANGLES = 100_000_000
 LARGEST_COORDINATE = 1e18

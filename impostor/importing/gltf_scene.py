@@ -8,10 +8,11 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from impostor.model_files import ModelFiles
-from impostor.model_gltf import Gltf, GltfMaterial, Primitive, Skin, TextureInfo, Vec2
-from impostor.model_materials import Material, decode_texture, finished, read_texture, srgb_from_linear, warn
-from impostor.model_parts import MOST_TRIANGLES, Part, normal_matrix
+from impostor.importing.gltf import Gltf, GltfMaterial, Primitive, Skin, TextureInfo, Vec2
+from impostor.importing.materials import Material, decode_texture, finished, read_texture, warn
+from impostor.importing.parts import MOST_TRIANGLES, Part, normal_matrix
+from impostor.importing.sources import ModelFiles
+from impostor.srgb import srgb_from_linear
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _REPEAT = 10497

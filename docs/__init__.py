@@ -1,0 +1,1 @@
+"""The script that makes the documentation's figures."""

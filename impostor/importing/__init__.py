@@ -1,0 +1,1 @@
+"""How each mesh format becomes parts; `impostor.model` puts the parts together."""

@@ -1,0 +1,81 @@
+"""The house rules that no single test of a part can hold: who imports whom, and how large a file grows."""
+
+import ast
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from runtime import gpu
+from runtime.renderer import ImpostorRenderer
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = ("impostor", "bake", "runtime")
+FILES = {path.relative_to(ROOT).as_posix(): path for package in PACKAGES for path in ROOT.glob(f"{package}/**/*.py")}
+MOST_LINES = 450
+MAY_IMPORT = {"impostor": {"impostor"}, "bake": {"bake", "impostor"}, "runtime": {"runtime", "impostor"}}
+
+
+def imports(path):
+    """Top-level names of every module that a file imports anywhere in it."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (name.name.split(".")[0] for name in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module.split(".")[0] if node.level == 0 else Path(path).relative_to(ROOT).parts[0]
+
+
+def importers(module):
+    return sorted(name for name, path in FILES.items() if module in imports(path))
+
+
+@pytest.mark.parametrize("name", sorted(FILES))
+def test_a_file_imports_only_from_below_and_stays_short(name):
+    path, package = FILES[name], name.split("/")[0]
+    assert set(imports(path)) & set(PACKAGES) <= MAY_IMPORT[package]
+    assert len(path.read_text().splitlines()) < MOST_LINES
+
+
+def test_heavy_dependencies_have_one_way_in():
+    (trimesh,) = importers("trimesh")
+    assert re.fullmatch(r"impostor/model\w*\.py", trimesh)
+    assert importers("pyrender") == ["bake/capture.py"]
+    assert {name.split("/")[0] for name in importers("moderngl")} == {"runtime"}
+
+
+def test_every_package_and_every_data_file_is_shipped():
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+    folders = {path.parent.relative_to(ROOT) for path in FILES.values()}
+    assert set(settings["packages"]) == {".".join(folder.parts) for folder in folders}
+    shipped = {
+        file
+        for package, patterns in settings["package-data"].items()
+        for pattern in patterns
+        for file in (ROOT / package.replace(".", "/")).glob(pattern)
+        if file.is_file()
+    }
+    unshipped = {".py", ".pyc"}
+    data = {file for package in PACKAGES for file in (ROOT / package).rglob("*") if file.is_file()}
+    assert {file for file in data if file.suffix not in unshipped} == shipped
+
+
+def test_every_shader_of_the_runtime_is_compiled(ctx, monkeypatch):
+    compiled = set()
+
+    def read(name, read=gpu._with_includes):
+        compiled.add(name)
+        return read(name)
+
+    monkeypatch.setattr(gpu, "_with_includes", read)
+    ImpostorRenderer(ctx, cache_side=256).release()
+    assert compiled == {path.name for path in gpu.SHADERS.glob("*.*")}
+
+
+def test_includes_do_not_include_and_all_are_used():
+    included = set()
+    for path in gpu.SHADERS.glob("*.*"):
+        included |= set(re.findall(r'^#include "([^"]+)"$', path.read_text(), re.MULTILINE))
+    files = {path.name: path for path in (gpu.SHADERS / "include").iterdir()}
+    assert included == set(files)
+    assert not any("#include" in path.read_text() for path in files.values())

@@ -1,0 +1,110 @@
+"""Copies of a fan: their arrays, and the quad that each shows to a viewer."""
+
+import numpy as np
+import pytest
+
+from impostor.errors import SettingsError
+from impostor.lighting import Gloss
+from impostor.views import direction, rotation_about_y
+from runtime import Instances
+from runtime.instances import nearest_views, quads_toward
+from tests.solids import Sphere, solid_fan
+
+FAN = solid_fan(Sphere((0.5, 0.2, 0.0)), views=8, size=16, elevation_deg=10, slopes=(0.1, 0.2, -0.3))
+NEAR = solid_fan(Sphere((0.5, 0.2, 0.0)), views=8, size=16, distance=5.0, slopes=(0.3, 0.0, 0.0))
+
+
+def test_one_copy_at_the_origin_by_default():
+    one = Instances(FAN)
+    assert len(one) == 1
+    assert (one.positions.tolist(), one.yaws.tolist(), one.scales.tolist()) == ([[0, 0, 0]], [0], [1])
+    assert one.gloss == Gloss()
+    assert one.visible.all()
+
+
+def test_one_yaw_and_scale_serve_all_and_may_then_be_written_one_by_one():
+    three = Instances(FAN, np.zeros((3, 3)), 0.5, 2.0)
+    three.yaws[1] = 1
+    three.scales[2] = 3
+    assert (three.yaws.tolist(), three.scales.tolist()) == ([0.5, 1, 0.5], [2, 2, 3])
+
+
+def test_the_callers_arrays_are_copied():
+    mine = np.zeros((2, 3))
+    Instances(FAN, mine).positions[:] = 7
+    assert not mine.any()
+
+
+@pytest.mark.parametrize("positions", [np.zeros((0, 3)), []])
+def test_no_copies_at_all(positions):
+    none = Instances(FAN, positions)
+    assert len(none) == 0
+    assert len(quads_toward(none, np.array([0, 0, 9, 1.0]))) == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        ((np.zeros((4, 2)),), "positions of shape (4, 2); expected (N, 3)"),
+        ((np.zeros((4, 3)), np.zeros(3)), "yaws of shape (3,); expected (4,)"),
+        ((np.zeros((4, 3)), 0, np.zeros((4, 1))), "scales of shape (4, 1); expected (4,)"),
+        (((0, np.nan, 0),), "positions hold a number that is not finite"),
+        (((0, 0, 0), np.inf), "yaws hold a number that is not finite"),
+        (((0, 0, 0), 0, 0), "scales go down to 0; expected more than 0"),
+        (((0, 0, 0), 0, -2), "scales go down to -2"),
+    ],
+)
+def test_impossible_places_are_refused(arguments, problem):
+    with pytest.raises(SettingsError) as caught:
+        Instances(FAN, *arguments)
+    assert str(caught.value).startswith(f"solids: {problem}")
+
+
+def test_a_turned_copy_shows_the_view_that_its_turn_brings_round():
+    copies = Instances(FAN, np.tile((3.0, 0, -2), (8, 1)), np.arange(8) * np.pi / 4)
+    view, toward = nearest_views(copies, np.append(direction(0.1, 0.3), 0), np.arange(8))
+    assert view.tolist() == [0, 7, 6, 5, 4, 3, 2, 1]
+    np.testing.assert_allclose(toward, np.tile(direction(0.1, 0.3), (8, 1)))
+
+
+def test_each_copy_looks_at_the_eye_from_where_it_stands():
+    copies = Instances(FAN, [(0, 0, -50), (50, 0, 0), (-50, 0, 0), (0, 0, 50)])
+    view, toward = nearest_views(copies, np.array([0, 0, 0, 1.0]), np.arange(4))
+    assert view.tolist() == [0, 6, 2, 4]
+    np.testing.assert_allclose(np.linalg.norm(toward, axis=1), 1)
+
+
+@pytest.mark.parametrize("fan", [FAN, NEAR], ids=["orthographic", "perspective"])
+def test_seen_by_its_own_camera_a_quad_lies_on_the_views_picture(fan):
+    """Whatever plane the quad lies in, a surface point of it is drawn on the line of sight of that very point."""
+    yaw, scale, position = 0.9, 1.7, np.array([3.0, -1, 2])
+    copies = Instances(fan, position, yaw, scale)
+    view = fan.views[3]
+    turn = rotation_about_y(yaw)
+    if np.isinf(view.distance):
+        eye = np.append(turn @ view.basis[2], 0)
+    else:
+        eye = np.append(position + scale * turn @ (view.center + view.distance * view.basis[2]), 1)
+    quad = quads_toward(copies, eye)
+    assert quad.view.tolist() == [3]
+    model = view.center + np.random.default_rng(0).uniform(-0.7, 0.7, (20, 3))
+    world = position + scale * model @ turn.T
+    x, y, _ = view.project(model).T
+    drawn = quad.center + x[:, None] * quad.right + y[:, None] * quad.up
+    sight = eye[:3] - eye[3] * world
+    np.testing.assert_allclose(np.cross(drawn - world, sight), 0, atol=1e-9)
+
+
+def test_a_point_of_the_views_plane_is_drawn_where_it_is():
+    view, (offset, slope_right, slope_up) = FAN.views[0], FAN.views.plane[0]
+    quad = quads_toward(Instances(FAN, (1, 2, 3), 0.4, 2.0), np.append(direction(0.4, 0.2), 0))
+    x, y = 0.3, -0.6
+    model = view.unproject([x, y, offset + slope_right * x + slope_up * y])
+    expected = np.array([1, 2, 3]) + 2.0 * rotation_about_y(0.4) @ model
+    np.testing.assert_allclose(quad.center[0] + x * quad.right[0] + y * quad.up[0], expected)
+
+
+def test_invisible_copies_show_nothing():
+    copies = Instances(FAN, np.zeros((4, 3)))
+    copies.visible[[0, 2]] = False
+    assert quads_toward(copies, np.array([0, 0, 1.0, 0])).index.tolist() == [1, 3]
