@@ -43,6 +43,9 @@ _CURRENT_PROGRAM, _VERTEX_ARRAY, _DRAW_FRAMEBUFFER, _READ_FRAMEBUFFER = 0x8B8D, 
 _ACTIVE_TEXTURE, _TEXTURE0, _TEXTURE_2D, _TEXTURE_BINDING_2D, _SAMPLER_BINDING = 0x84E0, 0x84C0, 0x0DE1, 0x8069, 0x8919
 _DRAW_TARGET, _READ_TARGET = 0x8CA9, 0x8CA8
 _FILL, _CULL_FACE_MODE, _FRONT_FACE = 0x1B02, 0x0B45, 0x0B46
+_ARRAY_BUFFER, _ARRAY_BUFFER_BINDING, _UNPACK_BUFFER, _UNPACK_BUFFER_BINDING = 0x8892, 0x8894, 0x88EC, 0x88EF
+# How uploads read memory: row length, skipped rows and pixels, swapped bytes; the alignments follow each upload.
+_PIXEL_STORE = {0x0CF2: 0, 0x0CF3: 0, 0x0CF4: 0, 0x0CF0: 0, 0x0CF5: 4, 0x0D05: 4}
 
 
 @cache
@@ -121,12 +124,21 @@ class CallerState:
         self._polygon_mode = _integers(_POLYGON_MODE, 2)[0]
         self._program, self._vertex_array = _integers(_CURRENT_PROGRAM)[0], _integers(_VERTEX_ARRAY)[0]
         self._draw, self._read = _integers(_DRAW_FRAMEBUFFER)[0], _integers(_READ_FRAMEBUFFER)[0]
+        self._array_buffer, self._unpack_buffer = (
+            _integers(name)[0] for name in (_ARRAY_BUFFER_BINDING, _UNPACK_BUFFER_BINDING)
+        )
+        self._pixel_store = {name: _integers(name)[0] for name in _PIXEL_STORE}
         self._active = _integers(_ACTIVE_TEXTURE)[0]
-        self._textures = []
-        for unit in range(UNITS):
+        self._textures = {}
+        # moderngl makes and fills textures on the last unit.
+        for unit in (*range(UNITS), ctx.max_texture_units - 1):
             _call("glActiveTexture", _TEXTURE0 + unit)
-            self._textures.append((_integers(_TEXTURE_BINDING_2D)[0], _integers(_SAMPLER_BINDING)[0]))
+            self._textures[unit] = _integers(_TEXTURE_BINDING_2D)[0], _integers(_SAMPLER_BINDING)[0]
+            _call("glBindSampler", unit, 0)
         _call("glActiveTexture", self._active)
+        for name, value in _PIXEL_STORE.items():
+            _call("glPixelStorei", name, value)
+        _call("glBindBuffer", _UNPACK_BUFFER, 0)
 
     def bind_target(self) -> None:
         """Draw into the caller's framebuffer and viewport again, honouring its scissor box and colour mask."""
@@ -152,13 +164,17 @@ class CallerState:
         _call("glFrontFace", self._front_face)
         _call("glPolygonOffset", *self._polygon_offset)
         _call("glPolygonMode", _FRONT_AND_BACK, self._polygon_mode)
-        for unit, (texture, sampler) in enumerate(self._textures):
+        for unit, (texture, sampler) in self._textures.items():
             _call("glActiveTexture", _TEXTURE0 + unit)
             _call("glBindTexture", _TEXTURE_2D, texture)
             _call("glBindSampler", unit, sampler)
         _call("glActiveTexture", self._active)
         _call("glUseProgram", self._program)
         _call("glBindVertexArray", self._vertex_array)
+        _call("glBindBuffer", _ARRAY_BUFFER, self._array_buffer)
+        _call("glBindBuffer", _UNPACK_BUFFER, self._unpack_buffer)
+        for name, value in self._pixel_store.items():
+            _call("glPixelStorei", name, value)
 
 
 def set_state(
@@ -184,14 +200,19 @@ def set_state(
         _call("glBlendFunc", *blend)
         _call("glBlendEquation", 0x8006)
     _switch(_CULL_FACE, cull_back)
+    _call("glFrontFace", 0x0901)  # shaders ask for it, too
     if cull_back:
         _call("glCullFace", 0x0405)
-        _call("glFrontFace", 0x0901)
     _switch(_POLYGON_OFFSET_FILL, polygon_offset is not None)
     if polygon_offset is not None:
         _call("glPolygonOffset", float(polygon_offset[0]), float(polygon_offset[1]))
     if color_mask is not None:
         _call("glColorMask", *(int(on) for on in color_mask))
+
+
+def clear_color() -> None:
+    """Make the bound framebuffer zero, without the caller's clear values."""
+    _function("glClearBufferfv")(ctypes.c_uint(0x1800), 0, (ctypes.c_float * 4)())
 
 
 @contextmanager

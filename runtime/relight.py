@@ -137,6 +137,7 @@ class RelightPass:
             program = array.program
             array.release()
             program.release()
+        self._arrays.clear()
         for resource in (self._tiles, self._corners):
             resource.release()
 

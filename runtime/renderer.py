@@ -8,6 +8,7 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike
 
+from impostor.errors import SettingsError
 from impostor.fan import Fan
 from impostor.lighting import DirectionalLight, Gloss
 from impostor.model import Model
@@ -18,7 +19,7 @@ from runtime.grounds import GroundPass, GroundSurface
 from runtime.impostors import Batch, ImpostorPass
 from runtime.instances import Instances, Viewer
 from runtime.lights import LightTable
-from runtime.meshes import MeshBuffers, MeshInstance, MeshPass
+from runtime.meshes import OUTPUTS, MeshBuffers, MeshInstance, MeshPass
 from runtime.shadows import ShadowPass
 
 DEFAULT_LIGHTS = (DirectionalLight.from_angles(40, 45, (0.75, 0.75, 0.75)),)
@@ -134,7 +135,7 @@ class ImpostorRenderer:
         Raises
         ------
         SettingsError
-            A matrix of another shape, or one that cannot be inverted.
+            A matrix of another shape, or one that cannot be inverted; another output.
         """
         with preserved_state(self._ctx) as state:
             viewer = Viewer.from_matrices(clip_from_view, view_from_world, state.viewport)
@@ -174,6 +175,8 @@ class ImpostorRenderer:
             self._shadows.draw(state, fans, self._meshes, viewer, self.lights, self.ambient, ground)
 
     def _update_lights(self, output: str) -> None:
+        if output not in OUTPUTS:
+            raise SettingsError("output", f"{output!r}; expected one of {', '.join(OUTPUTS)}")
         if output == "albedo":
             self._table.update((), 1.0)
         else:

@@ -17,7 +17,7 @@ from impostor.fan import Fan
 from impostor.lighting import DirectionalLight
 from impostor.shadow_projection import Ground, casts_shadow, ground_from_sight, strip_points
 from impostor.strips import silhouette_strips
-from runtime.gl_state import CallerState, set_state
+from runtime.gl_state import CallerState, clear_color, set_state
 from runtime.gpu import load_program, set_uniforms
 from runtime.instances import Instances, Quads, Viewer, nearest_views, quads_toward
 from runtime.meshes import MeshInstance, draw_parts
@@ -127,7 +127,7 @@ class ShadowPass:
         target = self._target_for(viewer)
         target.use()
         set_state(color_mask=(True, True, True, True))
-        target.clear()
+        clear_color()
         for channel, light in enumerate(lights):
             mask = tuple(channel == other for other in range(CHANNELS))
             everywhere = {
