@@ -30,6 +30,7 @@ try:
     import OpenGL.contextdata
     import OpenGL.error
     import OpenGL.GL
+    import OpenGL.raw.GL.VERSION.GL_1_1 as raw_gl
     import pyrender
     from pyrender.shader_program import ShaderProgram, ShaderProgramCache
 
@@ -147,7 +148,10 @@ class _Texture(pyrender.Texture):
         limit = int(GL.glGetIntegerv(GL.GL_MAX_TEXTURE_SIZE))
         if max(width, height) > limit:
             raise GpuError("texture", f"{width}x{height} texels; expected at most {limit} a side on this GPU")
-        self._texid = GL.glGenTextures(1)
+        # PyOpenGL 3.1.0's own glGenTextures(1) fails from Python 3.12 on; the function under it does not.
+        names = np.zeros(1, np.uint32)
+        raw_gl.glGenTextures(1, names)
+        self._texid = int(names[0])
         target = GL.GL_TEXTURE_2D
         GL.glBindTexture(target, self._texid)
         shape = (width, height, 0, GL.GL_RGBA, GL.GL_UNSIGNED_BYTE)
