@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from impostor.cli import Force, Quiet, UpAxis, progress_bar
+from impostor.cli import Force, Quiet, UpAxis, check_name, progress_bar
 
 
 def register(app: typer.Typer) -> None:
@@ -40,17 +40,18 @@ def bake(
     """Bake a model into a fan: colour, depth, normal codes and silhouette from a circle of cameras."""
     from impostor.errors import SettingsError
     from impostor.fan import MAX_SIZE, MIN_SIZE
-    from impostor.files.output import check_output
     from impostor.views import layout_bases
 
     started = time.monotonic()
     # All that can be refused without the model is refused before it is loaded.
-    for path in (output, picture):
-        if path is not None:
-            check_output(path, force)
+    check_name(output, ".fan", force)
+    if picture is not None:
+        check_name(picture, ".png", force)
     layout_bases(layout, views, math.radians(elevation))
     if not MIN_SIZE <= size <= MAX_SIZE:
         raise SettingsError("--size", f"{size} texels; expected {MIN_SIZE} to {MAX_SIZE}")
+    if perspective is not None and not 0 < perspective < math.inf:
+        raise SettingsError("--perspective", f"{perspective:g} m; expected a distance above 0")
     if samples not in (None, 1, 2, 4):
         raise SettingsError("--samples", f"{samples}; expected 1, 2 or 4")
 
@@ -67,7 +68,7 @@ def bake(
             elevation_deg=elevation,
             layout=layout,
             size=size,
-            distance=float("inf") if perspective is None else perspective,
+            distance=math.inf if perspective is None else perspective,
             samples=samples,
             up=up,
             progress=progress,

@@ -22,6 +22,7 @@ DILATION = 2  # texels past the silhouette: what bilinear filtering of a view ca
 VIEWS_AT_ONCE = 16  # exact normals are held for so many views only
 SMALLEST_MIP = 4  # texels
 SPARED_BITS = 4  # of depth: 12 are finer than a quarter of a texel, and the file a fifth smaller
+FARTHEST = 1e6  # bounding radii; from there a perspective picture is an orthographic one, but for rounding
 STEEPEST_PLANE = 1.5  # slope; steeper quads lose more of their sides than they gain in the middle
 
 
@@ -65,7 +66,7 @@ def bake_fan(
     Raises
     ------
     SettingsError
-        A number or a choice out of range.
+        A number or a choice out of range, or views in which nothing of the object is seen.
     GpuError
         No OpenGL context.
 
@@ -77,6 +78,9 @@ def bake_fan(
         raise SettingsError("--size", f"{size} texels; expected {MIN_SIZE} to {MAX_SIZE}")
     bases = layout_bases(layout, views, np.radians(elevation_deg))
     cameras = frame(bases, np.concatenate([part.positions for part in model.primitives]), size, distance)
+    if FARTHEST * model.radius < distance < np.inf:
+        most = f"at most {FARTHEST * model.radius:.4g} m for this object, or none for an orthographic camera"
+        raise SettingsError("--perspective", f"{distance:g} m; expected {most}")
     layers = _Layers(views, size)
     # Resolving and coding one view overlaps with drawing the next.
     with Capture(model, size, samples) as capture, ThreadPoolExecutor(1) as worker:
@@ -136,6 +140,9 @@ class _Layers:
 
     def fan(self, model: Model, layout: str, views: Views, settings: dict[str, Any]) -> Fan:
         """All of it, as a fan."""
+        if not self._color[..., 3].any():
+            found = "the object covers no texel of any view"
+            raise SettingsError("--size", f"{found}; expected larger tiles, or cameras that do not see it edge-on")
         silhouette: NDArray[np.bool_] = self._color[..., 3] >= 128
         source = {"name": model.name, "sha256": model.source_hash}
         views = replace(views, plane=self._planes(views, silhouette))

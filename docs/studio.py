@@ -22,7 +22,7 @@ from impostor.fan import Fan
 from impostor.lighting import DirectionalLight
 from impostor.model import Model, load_model
 from impostor.shadow_projection import Ground
-from impostor.views import frame, layout_bases
+from impostor.views import basis_facing, direction, frame
 from runtime.cameras import Camera
 from runtime.gpu import make_context
 from runtime.grounds import GroundSurface
@@ -30,6 +30,14 @@ from runtime.offscreen import Offscreen
 from runtime.renderer import ImpostorRenderer
 
 SAMPLES = Path(__file__).resolve().parents[1] / "sample_models"
+MODELS = {
+    "house": "house.glb",
+    "knot": "knot.stl",
+    "pine": "pine.obj",
+    "statue": "statue.glb",
+    "tree": "tree.glb",
+    "truck": "truck.glb",
+}
 GROUND = Ground(np.array([0.0, 1.0, 0.0]))
 PAPER, INK = (250, 249, 246), (48, 46, 44)
 GAP = 12
@@ -48,11 +56,11 @@ class Studio:
         return make_context()
 
     def model(self, name: str) -> Model:
-        """A model from sample_models."""
+        """One of MODELS."""
         if name not in self._models:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ModelWarning)
-                self._models[name] = load_model(SAMPLES / name)
+                self._models[name] = load_model(SAMPLES / MODELS[name])
         return self._models[name]
 
     def fan(self, name: str, views: int = 96, size: int = 256, elevation_deg: float = 15.0) -> Fan:
@@ -65,11 +73,10 @@ class Studio:
     def exact_layers(self, name: str, azimuth_deg: float, size: int) -> tuple[TileLayers, NDArray[np.float64]]:
         """One view's layers before the normals are coded, and the view's basis (3, 3)."""
         model = self.model(name)
-        step = 360 / azimuth_deg if azimuth_deg else 1
-        bases = layout_bases("ring", round(step), np.radians(15))[[min(1, round(step) - 1)]]
-        view = frame(bases, np.concatenate([part.positions for part in model.primitives]), size)[0]
+        basis = basis_facing(direction(np.radians(azimuth_deg), np.radians(15)))
+        view = frame(basis[None], np.concatenate([part.positions for part in model.primitives]), size)[0]
         with Capture(model, size) as capture:
-            return resolve(capture.view(view), capture.samples), bases[0]
+            return resolve(capture.view(view), capture.samples), basis
 
 
 @dataclass
@@ -180,7 +187,7 @@ def paving(size: int = 512, across: int = 4) -> NDArray[np.uint8]:
     edge = np.minimum(_to_edge(shifted) / across, _to_edge(v * across * 2) / (2 * across)) * size
     shade = np.random.default_rng(5).normal(0, 0.035, (across * 2, across, 1))
     stone = np.array([0.63, 0.60, 0.55]) + shade[row % (2 * across), column]
-    stone += 0.035 * tileable_noise(size, 1.5, 6)[..., None] + 0.02 * tileable_noise(size, 20, 7)[..., None]
+    stone += 0.014 * tileable_noise(size, 8, 6)[..., None] + 0.02 * tileable_noise(size, 20, 7)[..., None]
     joint = np.clip(edge / 2.5 - 0.3, 0, 1)[..., None]
     color = joint * stone + (1 - joint) * np.array([0.40, 0.38, 0.33])
     return np.dstack([to_bytes(color), np.full((size, size), 255, np.uint8)])

@@ -13,14 +13,25 @@ from typing import Annotated, Any
 
 import typer
 
-from impostor.errors import ImpostorError, ModelWarning
+from impostor.errors import ImpostorError, ModelWarning, OutputError, SettingsError
+from impostor.files.output import check_output
 
 EPILOG = "Exit codes: 0 done, 1 failed, 2 wrong usage. Angles are in degrees, azimuth from +Z toward +X."
+
+
+def _known_axis(axis: str | None) -> str | None:
+    if axis not in (None, "y", "z"):
+        raise SettingsError("--up", f"{axis!r}; expected y or z")
+    return axis
+
 
 Force = Annotated[bool, typer.Option("--force", help="Replace the output if it exists.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress bar and no summary.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-UpAxis = Annotated[str, typer.Option("--up", metavar="y|z", help="The model file's up axis.")]
+UpAxis = Annotated[str, typer.Option("--up", metavar="y|z", help="The model file's up axis.", callback=_known_axis)]
+BakedUpAxis = Annotated[
+    str | None, typer.Option("--up", metavar="y|z", help="As the fan was baked if left out.", callback=_known_axis)
+]
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -36,15 +47,19 @@ def main(arguments: list[str] | None = None) -> int:
     int
         The exit code.
     """
-    warnings.showwarning = warn
-    warnings.simplefilter("ignore")
-    warnings.simplefilter("always", ModelWarning)
+    notices: list[str] = []
     try:
-        return typer.main.get_command(make_app()).main(arguments, "impostor", standalone_mode=False) or 0
+        with _held_warnings(notices):
+            code = typer.main.get_command(make_app()).main(arguments, "impostor", standalone_mode=False) or 0
+        for notice in notices:
+            print(f"impostor: warning: {notice}", file=sys.stderr)
+        return code
+    except SettingsError as error:
+        return _fail(str(error), 2)
     except ImpostorError as error:
         return _fail(str(error), 1)
     except typer.TyperException as error:
-        return _fail(f"{' '.join(error.format_message().split())} (see impostor --help)", 2)
+        return _fail(_usage_problem(error), 2)
     except (KeyboardInterrupt, typer.Abort):
         return _fail("stopped", 130)
     except MemoryError:
@@ -89,16 +104,15 @@ def info(
         summary = fan_summary(file)
         if picture is not None:
             from impostor.files.fan_file import read_fan
-            from impostor.files.output import check_output
             from impostor.summary import write_contact_sheet
 
-            check_output(picture, force)
+            check_name(picture, ".png", force)
             write_contact_sheet(read_fan(file), picture, force)
     else:
         from impostor.summary import model_summary
 
         if picture is not None:
-            raise typer.BadParameter(f"{file} is not a .fan; expected one")
+            raise SettingsError("--picture", f"{file} has no views; expected a .fan")
         summary = model_summary(file, up)
     print_summary(summary, as_json)
 
@@ -120,14 +134,28 @@ def validate(files: Annotated[list[Path], typer.Argument(metavar="FILE...", help
 
 
 def print_summary(summary: dict[str, Any], as_json: bool) -> None:
-    """Print a flat mapping as JSON, or as one aligned line an entry."""
+    """Print a mapping as JSON, or as one aligned line an entry."""
     if as_json:
         print(json.dumps(summary, indent=2))
         return
     width = max(map(len, summary))
     for key, value in summary.items():
-        text = ", ".join(map(str, value)) if isinstance(value, list) else value
-        print(f"{key.replace('_', ' '):{width}}  {'-' if text is None else text}")
+        print(f"{key.replace('_', ' '):{width}}  {_in_words(value)}")
+
+
+def _in_words(value: Any) -> str:
+    if isinstance(value, dict):
+        value = [f"{key} {_in_words(part)}" for key, part in value.items() if part is not None]
+    if isinstance(value, list):
+        return ", ".join(" to ".join(map(str, part)) if isinstance(part, list) else str(part) for part in value) or "-"
+    return "-" if value is None else str(value)
+
+
+def check_name(path: Path, suffix: str, force: bool) -> None:
+    """Refuse an output that cannot be written, or whose name would say that it is something else."""
+    if path.suffix.lower() != suffix:
+        raise OutputError(path, f"ends in {path.suffix!r}; expected a name that ends in {suffix!r}")
+    check_output(path, force)
 
 
 @contextmanager
@@ -148,9 +176,25 @@ def progress_bar(label: str, quiet: bool = False) -> Iterator[Callable[[int, int
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
-def warn(message: object, *_: Any, **__: Any) -> None:
-    """Print one line about something that the user may not expect."""
-    print(f"impostor: warning: {' '.join(str(message).split())}", file=sys.stderr)
+@contextmanager
+def _held_warnings(notices: list[str]) -> Iterator[None]:
+    """Gather what the user may not expect: it is said at the end, and a failed command says one line only."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        warnings.simplefilter("always", ModelWarning)
+        warnings.showwarning = lambda message, *_, **__: notices.append(" ".join(str(message).split()))
+        yield
+
+
+def _usage_problem(error: typer.TyperException) -> str:
+    """One line about flags and arguments, with the value that was given: Typer leaves it out."""
+    message = " ".join(error.format_message().split())
+    if isinstance(error, typer.BadParameter) and error.param is not None and hasattr(error.__cause__, "errors"):
+        problem: dict[str, Any] = error.__cause__.errors()[0]  # type: ignore[union-attr]
+        expected = problem["msg"].removeprefix("Input should be ").partition(",")[0]
+        message = f"{error.param.opts[0]}: {problem['input']!r}; expected {expected}"
+    context = getattr(error, "ctx", None)
+    return f"{message} (see {context.command_path if context else 'impostor'} --help)"
 
 
 def _fail(message: str, code: int) -> int:

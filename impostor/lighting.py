@@ -47,8 +47,8 @@ class DirectionalLight:
     @classmethod
     def from_angles(cls, azimuth_deg: float, elevation_deg: float, color: ArrayLike = (1.0, 1.0, 1.0)):
         """The light that stands at an azimuth and an elevation, in degrees."""
-        r, g, b = np.asarray(color, float)
-        x, y, z = direction(np.radians(azimuth_deg), np.radians(elevation_deg))
+        r, g, b = np.asarray(color, float).tolist()
+        x, y, z = direction(np.radians(azimuth_deg), np.radians(elevation_deg)).tolist()
         return cls((x, y, z), (r, g, b))
 
 

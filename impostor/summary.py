@@ -19,7 +19,7 @@ SHEET_VIEWS = 8
 
 
 def fan_summary(path: Path) -> dict[str, Any]:
-    """A flat description of a `.fan` file, ready for JSON."""
+    """A description of a `.fan` file, ready for JSON."""
     manifest = read_manifest(path)
     fan = read_fan(path)
     size = path.stat().st_size
@@ -34,20 +34,20 @@ def fan_summary(path: Path) -> dict[str, Any]:
         "tile_size": manifest.size,
         "normal_levels": len(fan.normal),
         "camera": "orthographic" if manifest.distance is None else f"perspective at {manifest.distance:g} m",
-        "bounds_m": [f"{low:.4g} to {high:.4g}" for low, high in fan.bounds.T],
-        "texel_m": round(2 * float(fan.views.radius[0]) / fan.size, 6),
+        "bounds_m": _ranges(fan.bounds),
+        "texel_m": _short(2 * float(fan.views.radius[0]) / fan.size),
         "covered_texels": fan.covered_texels,
         "bytes_per_covered_texel": round(size / max(fan.covered_texels, 1), 3),
         "uniform_albedo": None if albedo is None else "#{:02x}{:02x}{:02x}".format(*albedo),
         "source": manifest.source.get("name"),
         "source_sha256": manifest.source.get("sha256"),
-        "settings": [f"{key} {value}" for key, value in sorted(manifest.settings.items()) if value is not None],
+        "settings": dict(sorted(manifest.settings.items())),
         "written_by": manifest.tool,
     }
 
 
 def model_summary(path: Path, up: str = "y") -> dict[str, Any]:
-    """A flat description of a model file, ready for JSON."""
+    """A description of a model file, ready for JSON."""
     model = load_model(path, up=up)
     textures = {id(part.material.texture): part.material.texture for part in model.primitives}
     sizes = [f"{t.shape[1]}x{t.shape[0]}" for t in textures.values() if t is not None]
@@ -60,10 +60,20 @@ def model_summary(path: Path, up: str = "y") -> dict[str, Any]:
         "materials": [f"{part.material.name} ({part.material.alpha_mode.lower()})" for part in model.primitives],
         "textures": sizes,
         "vertex_colors": any(part.colors is not None for part in model.primitives),
-        "bounds_m": [f"{low:.4g} to {high:.4g}" for low, high in model.bounds.T],
-        "radius_m": round(model.radius, 6),
+        "bounds_m": _ranges(model.bounds),
+        "radius_m": _short(model.radius),
         "sha256": model.source_hash,
     }
+
+
+def _ranges(bounds: NDArray[np.float64]) -> list[list[float]]:
+    """Least and greatest x, y and z."""
+    return [[_short(low), _short(high)] for low, high in bounds.T]
+
+
+def _short(metres: float) -> float:
+    """Rounded for reading, whatever its size."""
+    return float(f"{metres:.6g}")
 
 
 def contact_sheet(fan: Fan) -> NDArray[np.uint8]:

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from impostor.cli import AsJson, Force, Quiet, UpAxis, progress_bar
-from impostor.errors import SettingsError
+from impostor.cli import AsJson, BakedUpAxis, Force, Quiet, UpAxis, check_name, progress_bar
+from impostor.errors import ModelWarning, SettingsError
 
 if TYPE_CHECKING:
     from impostor.fan import Fan
-    from impostor.lighting import DirectionalLight
+    from impostor.lighting import DirectionalLight, Gloss
     from impostor.model import Model
+    from runtime.cameras import Camera
 
 METHODS = ("nearest",)
 MAX_SIDE = 16384
@@ -36,11 +39,11 @@ def render(
     subject: Annotated[Path, typer.Argument(metavar="FAN|MODEL")],
     output_file: Annotated[Path, typer.Option("-o", metavar="OUT.png")],
     size: Annotated[str, typer.Option(metavar="WxH")] = "512x512",
-    azimuth: Annotated[float, typer.Option(metavar="DEG", help="Of an orthographic camera.")] = 0.0,
-    elevation: Annotated[float, typer.Option(metavar="DEG")] = 15.0,
+    azimuth: Annotated[float | None, typer.Option(metavar="DEG", help="Of an orthographic camera; 0.")] = None,
+    elevation: Annotated[float | None, typer.Option(metavar="DEG", help="Of an orthographic camera; 15.")] = None,
     eye: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Of a perspective camera.")] = None,
     target: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="The object's middle if left out.")] = None,
-    fov: Annotated[float, typer.Option(metavar="DEG", help="Vertical field of view.")] = 40.0,
+    fov: Annotated[float | None, typer.Option(metavar="DEG", help="Vertical field of view; 40.")] = None,
     light: Lights = None,
     ambient: Annotated[float | None, typer.Option(metavar="A", help="Linear light that reaches everything.")] = None,
     gloss: Annotated[str | None, typer.Option(metavar="STRENGTH,SHININESS", help="A highlight.")] = None,
@@ -54,15 +57,13 @@ def render(
     force: Force = False,
 ) -> None:
     """Draw a fan, or a mesh through the same camera and lights, as a PNG."""
-    from impostor.files.output import check_output
-    from impostor.lighting import Gloss
     from runtime.gpu import make_context
     from runtime.offscreen import save_png
-    from runtime.pictures import PictureSettings, draw_picture, eye_camera, orbit_camera
+    from runtime.pictures import PictureSettings, draw_picture
 
     width, height = _size(size)
     _check_method(method)
-    options = {}
+    options: dict[str, Any] = {"output": output, "shadow": not no_shadow}
     if light:
         options["lights"] = tuple(_light(text) for text in light)
     if ambient is not None:
@@ -70,24 +71,15 @@ def render(
             raise SettingsError("--ambient", f"{ambient:g}; expected a number of at least 0")
         options["ambient"] = ambient
     if gloss is not None:
-        options["gloss"] = Gloss(*_numbers("--gloss", gloss, 2))
-    if background == "transparent":
-        options["background"] = (0.0, 0.0, 0.0, 0.0)
-    elif background is not None:
-        options["background"] = (*_numbers("--background", background, 3), 1.0)
-    settings = PictureSettings(width, height, output=output, shadow=not no_shadow, **options)
-    check_output(output_file, force)
+        options["gloss"] = _gloss(gloss)
+    if background is not None:
+        options["background"] = _background(background)
+    settings = PictureSettings(width, height, **options)
+    viewpoint = _viewpoint(azimuth, elevation, eye, target, fov)
+    check_name(output_file, ".png", force)
     loaded = _load(subject, up)
-    if eye is None:
-        if target is not None:
-            raise SettingsError("--target", f"{target} without --eye; expected both, or --azimuth and --elevation")
-        if not abs(elevation) <= 90 or not math.isfinite(azimuth):
-            raise SettingsError("--elevation", f"{elevation:g} degrees; expected -90 to 90 (azimuth {azimuth:g})")
-        camera = orbit_camera(loaded, math.radians(azimuth), math.radians(elevation), width / height)
-    else:
-        aim = loaded.bounds.mean(axis=0) if target is None else _numbers("--target", target, 3)
-        camera = eye_camera(loaded, _numbers("--eye", eye, 3), aim, fov, width / height)
-    save_png(output_file, draw_picture(make_context(), loaded, camera, settings), force=force)
+    pixels = draw_picture(make_context(), loaded, viewpoint(loaded, width / height), settings)
+    save_png(output_file, pixels, force=force)
 
 
 def compare(
@@ -104,14 +96,12 @@ def compare(
     picture: Annotated[
         Path | None, typer.Option(metavar="PNG", help="Write mesh, impostor and difference side by side.")
     ] = None,
-    up: Annotated[str | None, typer.Option(metavar="y|z", help="As the fan was baked if left out.")] = None,
+    up: BakedUpAxis = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
     """Measure a fan against its mesh from cameras between the baked views."""
-    from impostor.cli import warn
     from impostor.files.fan_file import read_fan
-    from impostor.files.output import check_output
     from impostor.model import load_model
     from runtime.compare import Comparison, side_by_side
     from runtime.compare import as_json as rows_as_json
@@ -127,11 +117,12 @@ def compare(
         raise SettingsError("--size", f"{size} pixels; expected 16 to 4096")
     lights = tuple(_light(text) for text in light) if light else DEFAULT_LIGHTS
     if picture is not None:
-        check_output(picture, force)
+        check_name(picture, ".png", force)
     fan = read_fan(fan_file)
     model = load_model(model_file, up=up or str(fan.settings.get("up", "y")))
     if fan.source.get("sha256") not in (None, model.source_hash):
-        warn(f"{model_file} is not the file that {fan_file} was baked from ({fan.source.get('name')})")
+        baked_from = f"{fan_file} was baked from another ({fan.source.get('name')})"
+        warnings.warn(f"{model_file}: is not what the fan shows: {baked_from}", ModelWarning, stacklevel=1)
     comparison = Comparison(make_context(), fan, model, size, lights)
     try:
         with progress_bar("comparing", quiet) as progress:
@@ -176,15 +167,61 @@ def _numbers(flag: str, text: str, *counts: int) -> list[float]:
     return values
 
 
+def _viewpoint(
+    azimuth: float | None, elevation: float | None, eye: str | None, target: str | None, fov: float | None
+) -> Callable[[Fan | Model, float], Camera]:
+    """What makes the camera that the flags ask for, from the object and the picture's aspect."""
+    from runtime.pictures import eye_camera, orbit_camera
+
+    if eye is None:
+        for flag, value in (("--target", target), ("--fov", fov)):
+            if value is not None:
+                raise SettingsError(flag, f"{value} without --eye; expected both, or --azimuth and --elevation")
+        around, above = azimuth or 0.0, 15.0 if elevation is None else elevation
+        if not math.isfinite(around):
+            raise SettingsError("--azimuth", f"{around:g} degrees; expected a finite number")
+        if not abs(above) <= 90:
+            raise SettingsError("--elevation", f"{above:g} degrees; expected -90 to 90")
+        around, above = math.radians(around), math.radians(above)
+        return lambda subject, aspect: orbit_camera(subject, around, above, aspect)
+    for flag, value in (("--azimuth", azimuth), ("--elevation", elevation)):
+        if value is not None:
+            raise SettingsError(flag, f"{value:g} with --eye; expected one of the two")
+    place, aim = _numbers("--eye", eye, 3), None if target is None else _numbers("--target", target, 3)
+    return lambda subject, aspect: eye_camera(subject, place, aim, 40.0 if fov is None else fov, aspect)
+
+
 def _light(text: str) -> DirectionalLight:
     from impostor.lighting import DirectionalLight
 
     azimuth, elevation, *color = _numbers("--light", text, 2, 5)
+    if not abs(elevation) <= 90 or any(value < 0 for value in color):
+        raise SettingsError(
+            "--light", f"{text!r}; expected an elevation of -90 to 90 degrees and a colour of at least 0"
+        )
     return DirectionalLight.from_angles(azimuth, elevation, color or (0.75, 0.75, 0.75))
+
+
+def _gloss(text: str) -> Gloss:
+    from impostor.lighting import Gloss
+
+    strength, shininess = _numbers("--gloss", text, 2)
+    if strength < 0 or shininess <= 0:
+        raise SettingsError("--gloss", f"{text!r}; expected a strength of at least 0 and a shininess above 0")
+    return Gloss(strength, shininess)
+
+
+def _background(text: str) -> tuple[float, float, float, float]:
+    if text == "transparent":
+        return 0.0, 0.0, 0.0, 0.0
+    red, green, blue = _numbers("--background", text, 3)
+    if not 0 <= min(red, green, blue) <= max(red, green, blue) <= 1:
+        raise SettingsError("--background", f"{text!r}; expected numbers of 0 to 1, or transparent")
+    return red, green, blue, 1.0
 
 
 def _size(text: str) -> tuple[int, int]:
     width, _, height = text.lower().partition("x")
-    if not (width.isdigit() and height.isdigit() and 1 <= int(width) <= MAX_SIDE and 1 <= int(height) <= MAX_SIDE):
+    if not (width.isdecimal() and height.isdecimal() and 1 <= int(width) <= MAX_SIDE and 1 <= int(height) <= MAX_SIDE):
         raise SettingsError("--size", f"{text!r}; expected WIDTHxHEIGHT in pixels, such as 640x480, at most {MAX_SIDE}")
     return int(width), int(height)

@@ -21,6 +21,7 @@ from runtime.renderer import DEFAULT_AMBIENT, DEFAULT_LIGHTS, ImpostorRenderer
 BACKGROUND = (0.4, 0.5, 0.6, 1.0)
 MESH_SAMPLES = 4
 SSIM_WINDOW = 7
+HIGHEST_PSNR = 100.0  # dB, of equal pictures: JSON has no infinity
 
 
 @dataclass(frozen=True)
@@ -144,12 +145,13 @@ def errors(pair: Pair) -> tuple[float, float, float, float]:
     """PSNR in dB, SSIM, FLIP and silhouette IoU of one pair; see `Row`."""
     truth, shown = over_background(pair.mesh), over_background(pair.impostor)
     solid = pair.mesh[..., 3] >= 128, pair.impostor[..., 3] >= 128
-    iou = np.count_nonzero(solid[0] & solid[1]) / max(np.count_nonzero(solid[0] | solid[1]), 1)
+    either = np.count_nonzero(solid[0] | solid[1])
+    iou = np.count_nonzero(solid[0] & solid[1]) / either if either else 1.0
     pixels = (pair.mesh[..., 3] > 0) | (pair.impostor[..., 3] > 0)
     if not pixels.any():
-        return np.inf, 1.0, 0.0, 1.0
+        return HIGHEST_PSNR, 1.0, 0.0, 1.0
     square = float(np.mean((truth - shown)[pixels] ** 2))
-    psnr = -10 * np.log10(max(square, 1e-10))
+    psnr = -10 * np.log10(max(square, 10 ** (-HIGHEST_PSNR / 10)))
     window = min(SSIM_WINDOW, min(truth.shape[:2]) - 1 | 1)
     similarity = structural_similarity(truth, shown, channel_axis=2, data_range=1, full=True, win_size=window)[1]
     flip_map = evaluate(truth, shown, "LDR")[0]

@@ -9,13 +9,14 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from impostor.lighting import Gloss
 from runtime.fan_textures import FanTextures
 from runtime.gl_state import CallerState, set_state
 from runtime.gpu import load_program, set_uniforms
 from runtime.instances import Instances, Quads, Viewer, quads_toward
 from runtime.lights import LightTable
 from runtime.relight import CORNERS, ROW_DTYPE, TILE_DTYPE, ColormapPass, InstanceBuffer, RelightPass
-from runtime.tiles import CacheFull, TileCache
+from runtime.tiles import CacheFull, TileCache, TileIndex
 
 QUAD_DTYPE = np.dtype(
     [
@@ -39,6 +40,32 @@ class Batch:
 
     instances: Instances
     textures: FanTextures
+
+
+@dataclass(frozen=True, eq=False)
+class _Tiles:
+    """The tiles that a batch shows in a frame.
+
+    Parameters
+    ----------
+    batch : Batch
+    index : TileIndex
+    of_quads : ndarray, (N,) intp
+        Entry in the index of every quad's tile.
+    entries : ndarray, (M,) intp
+        The distinct ones.
+    quads : Quads
+        One that shows each of them.
+    levels : ndarray, (M,) intp
+        Their mip levels.
+    """
+
+    batch: Batch
+    index: TileIndex
+    of_quads: NDArray[np.intp]
+    entries: NDArray[np.intp]
+    quads: Quads
+    levels: NDArray[np.intp]
 
 
 class ImpostorPass:
@@ -68,7 +95,9 @@ class ImpostorPass:
             self._program,
             [(self._corners, "2f", "corner"), (self._quads.buffer, "3f 3f 3f 3f 4f 3f 4f/i", *names)],
         )
-        self._lit: dict[object, int] = {}
+        self._indexes: dict[tuple[int, Gloss], TileIndex] = {}
+        self._frame: tuple[object, ...] | None = None
+        self._shown: list[_Tiles] = []
         self._normals_for: NDArray[np.float64] | None = None
         self.statistics: dict[str, int] = {}
 
@@ -83,18 +112,16 @@ class ImpostorPass:
             # Normals turn with the viewer, so nothing lit before can be kept.
             self.forget()
         self._normals_for = viewer.view_from_world[:3, :3] if output == "normal" else None
-        self.statistics = dict.fromkeys(("instances", "tiles", "relit", "coarser"), 0)
-        seen = [(batch, _seen_quads(batch, viewer)) for batch in batches]
-        seen = [(batch, quads) for batch, quads in seen if len(quads)]
-        if not seen:
+        frame = _frame_key(batches, viewer)
+        if frame != self._frame:
+            # Where nothing has moved, the last frame's quads are this one's.
+            self._frame = None
+            self._arrange(batches, viewer)
+            self._frame = frame
+        self.statistics["relit"] = sum(self._relight_stale(tiles, lights) for tiles in self._shown)
+        cache, count = self._cache, self.statistics["instances"]
+        if cache is None or not count:
             return
-        cache = self._cache_for([batch for batch, _ in seen])
-        placed = self._place(cache, seen, viewer, lights)
-        records = np.concatenate(
-            [_records(batch, quads, places) for (batch, quads), places in zip(seen, placed, strict=True)]
-        )
-        order = np.argsort(-(records["center"] @ _sight(viewer)), kind="stable")
-        self._quads.write(records[order])
         state.bind_target()
         set_state(depth_test=True, depth_write=True, blend=(moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA))
         cache.color.use(0)
@@ -107,94 +134,120 @@ class ImpostorPass:
             tile_depth=1,
             alpha_cutoff=ALPHA_CUTOFF,
         )
-        self._array.render(moderngl.TRIANGLE_STRIP, instances=len(records))
-        self.statistics["instances"] = len(records)
+        self._array.render(moderngl.TRIANGLE_STRIP, instances=count)
 
     def forget(self) -> None:
         """Drop every relit tile."""
+        self._frame = None
+        self._shown.clear()
+        self._indexes.clear()
         if self._cache is not None:
             self._cache.clear()
-            self._lit.clear()
 
-    def _cache_for(self, batches: Sequence[Batch]) -> TileCache:
-        largest = 1 << max(max(batch.textures.size for batch in batches) - 1, 255).bit_length()
-        if self._cache is None or self._cache.page < largest:
+    def _arrange(self, batches: Sequence[Batch], viewer: Viewer) -> None:
+        """Find the quads of a frame and places for their tiles, and upload the quads, far to near."""
+        self._shown = []
+        self.statistics = dict.fromkeys(("instances", "tiles", "relit", "coarser"), 0)
+        seen = [(batch, _seen_quads(batch, viewer)) for batch in batches]
+        seen = [(batch, quads) for batch, quads in seen if len(quads)]
+        if not seen:
+            return
+        placed = self._place(seen, viewer)
+        records = np.concatenate(
+            [_records(batch, quads, places) for (batch, quads), places in zip(seen, placed, strict=True)]
+        )
+        order = np.argsort(-(records["center"] @ _sight(viewer)), kind="stable")
+        self._quads.write(records[order])
+        self.statistics["instances"] = len(records)
+        self.statistics["tiles"] = sum(len(tiles.entries) for tiles in self._shown)
+
+    def _cache_for(self, batches: Sequence[Batch], side: int) -> TileCache:
+        page = 1 << max(max(batch.textures.size for batch in batches) - 1, 255).bit_length()
+        side = max(side, page)
+        if self._cache is None or self._cache.page < page or self._cache.side < side:
+            self.forget()
             if self._cache is not None:
                 self._cache.release()
-            self._cache = TileCache(self._ctx, max(self._cache_side, largest), largest)
-            self._lit.clear()
+                self._cache = None
+            self._cache = TileCache(self._ctx, side, page)
         return self._cache
 
-    def _place(
-        self, cache: TileCache, seen: list[tuple[Batch, Quads]], viewer: Viewer, lights: LightTable
-    ) -> list[NDArray[np.int32]]:
-        """Find or relight a tile for every quad; when the cache is full, empty it, then go to coarser tiles."""
+    def _place(self, seen: list[tuple[Batch, Quads]], viewer: Viewer) -> list[NDArray[np.int32]]:
+        """Places (N, 3) of every batch's tiles.
+
+        When the cache is full it is emptied; when that is not enough, tiles get coarser, and in the end it grows.
+        """
+        batches = [batch for batch, _ in seen]
         wanted = [_levels(batch, quads, viewer) for batch, quads in seen]
-        for coarser in range(16):
-            levels = [
-                np.minimum(level + coarser, batch.textures.levels - 1)
-                for level, (batch, _) in zip(wanted, seen, strict=True)
-            ]
-            self.statistics["coarser"] = coarser
-            try:
-                return self._relit(cache, seen, levels, lights)
-            except CacheFull:
-                cache.clear()
-                self._lit.clear()
-            try:
-                return self._relit(cache, seen, levels, lights)
-            except CacheFull:
-                cache.clear()
-                self._lit.clear()
-        raise CacheFull
+        coarsest = max(batch.textures.levels for batch in batches)
+        cache = self._cache_for(batches, self._cache_side)
+        while True:
+            for coarser in (each for each in range(coarsest) for _ in range(2)):
+                self.statistics["coarser"] = coarser
+                try:
+                    self._shown = [
+                        self._tiles(cache, batch, quads, np.minimum(level + coarser, batch.textures.levels - 1))
+                        for level, (batch, quads) in zip(wanted, seen, strict=True)
+                    ]
+                except CacheFull:
+                    self.forget()
+                else:
+                    return [tiles.index.places[tiles.of_quads] for tiles in self._shown]
+            cache = self._cache_for(batches, 2 * cache.side)
 
-    def _relit(
-        self, cache: TileCache, seen: list[tuple[Batch, Quads]], levels: list[NDArray[np.intp]], lights: LightTable
-    ) -> list[NDArray[np.int32]]:
-        result, work = [], []
-        for (batch, quads), level in zip(seen, levels, strict=True):
-            fan = batch.textures
-            yaw = batch.instances.yaws[quads.index].astype(np.float32).view(np.int32).astype(np.int64)
-            packed = yaw << 32 | quads.view << 8 | level
-            unique, first, inverse = np.unique(packed, return_index=True, return_inverse=True)
-            identity = (id(fan), batch.instances.gloss)
-            keys = [(identity, key) for key in unique.tolist()]
-            places, new = cache.places(keys, (fan.size >> level[first]).tolist())
-            stale = np.array([self._lit.get(key) != lights.version for key in keys], bool) | new
-            self.statistics["tiles"] += len(keys)
-            if stale.any():
-                chosen = np.flatnonzero(stale)
-                work.append((batch, quads.take(first[chosen]), level[first[chosen]], places[chosen]))
-                self._lit.update((keys[index], lights.version) for index in chosen)
-            result.append(places[inverse])
-        for item in work:
-            self._relight_tiles(cache, lights, *item)
-        return result
-
-    def _relight_tiles(
-        self,
-        cache: TileCache,
-        lights: LightTable,
-        batch: Batch,
-        quads: Quads,
-        levels: NDArray[np.intp],
-        places: NDArray[np.int32],
-    ) -> None:
+    def _tiles(self, cache: TileCache, batch: Batch, quads: Quads, levels: NDArray[np.intp]) -> _Tiles:
         fan = batch.textures
-        self.statistics["relit"] += len(quads)
-        for start in range(0, len(quads), self._colormaps.ROWS):
-            part = slice(start, start + self._colormaps.ROWS)
-            count = len(quads.index[part])
-            rows = np.zeros(count, ROW_DTYPE)
-            rows["row"], rows["basis"] = np.arange(count), quads.basis[part]
-            rows["albedo"] = fan.albedo
-            rows["gloss"] = batch.instances.gloss.strength, batch.instances.gloss.shininess
-            self._colormaps.write(rows, lights, self._normals_for)
-            tiles = np.zeros(count, TILE_DTYPE)
-            tiles["place"][:, :3], tiles["place"][:, 3] = places[part], levels[part]
-            tiles["origin"][:, :2] = fan.tile_origins(quads.view[part], levels[part])
-            tiles["origin"][:, 2] = rows["row"]
-            self._relight.draw(fan, tiles, self._colormaps.texture, cache, normals=self._normals_for is not None)
+        owner = id(fan), batch.instances.gloss
+        index = self._indexes.setdefault(owner, TileIndex())
+        yaw = batch.instances.yaws[quads.index].astype(np.float32).view(np.int32).astype(np.int64)
+        keys = yaw << 32 | quads.view << 8 | levels
+        entries = index.find(keys)
+        if (entries < 0).any():
+            missing = np.flatnonzero(entries < 0)
+            fresh, first = np.unique(keys[missing], return_index=True)
+            sizes = (fan.size >> levels[missing[first]]).tolist()
+            places, _ = cache.places([(owner, key) for key in fresh.tolist()], sizes)
+            index.add(fresh, places)
+            entries = index.find(keys)
+        one_quad = np.full(len(index.places), -1)
+        one_quad[entries] = np.arange(len(entries))
+        distinct = np.flatnonzero(one_quad >= 0)
+        chosen = one_quad[distinct]
+        return _Tiles(batch, index, entries, distinct, quads.take(chosen), levels[chosen])
+
+    def _relight_stale(self, tiles: _Tiles, lights: LightTable) -> int:
+        """Relight what was lit otherwise or not at all; returns how many tiles that were."""
+        assert self._cache is not None
+        versions = tiles.index.versions[tiles.entries]
+        stale, new = versions != lights.version, versions < 0
+        for chosen in (np.flatnonzero(new), np.flatnonzero(stale & ~new)):
+            for start in range(0, len(chosen), self._colormaps.ROWS):
+                self._relight_tiles(tiles, chosen[start : start + self._colormaps.ROWS], lights)
+        tiles.index.versions[tiles.entries] = lights.version
+        return int(np.count_nonzero(stale))
+
+    def _relight_tiles(self, tiles: _Tiles, chosen: NDArray[np.intp], lights: LightTable) -> None:
+        """Relight some of a frame's tiles, either all of them new or none."""
+        assert self._cache is not None
+        fan, gloss = tiles.batch.textures, tiles.batch.instances.gloss
+        entries, levels, views = tiles.entries[chosen], tiles.levels[chosen], tiles.quads.view[chosen]
+        new = bool(tiles.index.versions[entries[0]] < 0)
+        rows = np.zeros(len(chosen), ROW_DTYPE)
+        rows["row"], rows["basis"] = np.arange(len(chosen)), tiles.quads.basis[chosen]
+        rows["albedo"], rows["gloss"] = fan.albedo, (gloss.strength, gloss.shininess)
+        self._colormaps.write(rows, lights, self._normals_for)
+        work = np.zeros(len(chosen), TILE_DTYPE)
+        work["place"][:, :3], work["place"][:, 3] = tiles.index.places[entries], levels
+        work["origin"][:, :2], work["origin"][:, 2] = fan.tile_origins(views, levels), rows["row"]
+        # A new tile is drawn whole, because another may lie beneath.
+        work["part"][:, 2:] = work["place"][:, 2:3]
+        if not new:
+            covered = fan.fan.covered_rectangles[views]
+            work["part"][:, :2] = np.maximum((covered[:, :2] >> levels[:, None]) - 1, 0)
+            reach = (covered[:, 2:] - 1 >> levels[:, None]) + 2
+            work["part"][:, 2:] = np.minimum(reach, work["part"][:, 2:])
+        show_normals = self._normals_for is not None
+        self._relight.draw(fan, work, self._colormaps.texture, self._cache, normals=show_normals, depth=new)
 
     def release(self) -> None:
         """Free everything this pass made."""
@@ -207,8 +260,9 @@ class ImpostorPass:
 
 def _seen_quads(batch: Batch, viewer: Viewer) -> Quads:
     quads = quads_toward(batch.instances, viewer.eye)
-    radius = batch.instances.fan.views.radius.max() * np.sqrt(2) * quads.scale
-    return quads.take(viewer.sees(quads.origin, radius))
+    diagonals = np.stack([quads.right + quads.up, quads.right - quads.up])
+    reach = batch.instances.fan.views.radius[quads.view] * np.linalg.norm(diagonals, axis=-1).max(axis=0)
+    return quads.take(viewer.sees(quads.center, reach))
 
 
 def _levels(batch: Batch, quads: Quads, viewer: Viewer) -> NDArray[np.intp]:
@@ -237,6 +291,18 @@ def _records(batch: Batch, quads: Quads, places: NDArray[np.int32]) -> NDArray[n
     depth = np.stack([low - offset, high - low, -slope_right * reach[:, 0], -slope_up * reach[:, 0]], axis=-1)
     records["depth"] = depth * quads.scale[:, None]
     return records
+
+
+def _frame_key(batches: Sequence[Batch], viewer: Viewer) -> tuple[object, ...]:
+    """Equal for two frames that show the same quads."""
+    copies = [batch.instances for batch in batches]
+    return (
+        viewer.clip_from_view.tobytes(),
+        viewer.view_from_world.tobytes(),
+        viewer.viewport,
+        *((id(batch.textures), batch.instances.gloss) for batch in batches),
+        *(array.tobytes() for each in copies for array in (each.positions, each.yaws, each.scales, each.visible)),
+    )
 
 
 def _sight(viewer: Viewer) -> NDArray[np.float64]:

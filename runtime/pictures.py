@@ -23,6 +23,7 @@ OUTPUTS = ("lit", "albedo", "normal", "depth", "alpha")
 MESH_SAMPLES = 4
 GROUND_ALBEDO = (0.55, 0.54, 0.5)
 GROUND_REACH = 12  # bounding radii
+GROUND_GAP = 1e-3  # bounding radii: what lies flat on the ground must not fight with it for the pixels
 
 
 @dataclass(frozen=True)
@@ -64,11 +65,14 @@ def orbit_camera(subject: Fan | Model, azimuth: float, elevation: float, aspect:
     return Camera.orthographic(subject.bounds.mean(axis=0), subject.radius, azimuth, elevation, aspect)
 
 
-def eye_camera(subject: Fan | Model, eye: ArrayLike, target: ArrayLike, fov_deg: float, aspect: float) -> Camera:
-    """A perspective camera whose range holds the object and the ground around it."""
-    distance = float(np.linalg.norm(np.asarray(eye, float) - subject.bounds.mean(axis=0)))
+def eye_camera(subject: Fan | Model, eye: ArrayLike, target: ArrayLike | None, fov_deg: float, aspect: float) -> Camera:
+    """A perspective camera, on the object's middle if no target is given; it sees the object and the ground around."""
+    middle = subject.bounds.mean(axis=0)
+    distance = float(np.linalg.norm(np.asarray(eye, float) - middle))
     near = max((distance - 1.1 * subject.radius) / 2, 0.01 * subject.radius)
-    return Camera.perspective(eye, target, fov_deg, aspect, near, distance + 2 * GROUND_REACH * subject.radius)
+    return Camera.perspective(
+        eye, middle if target is None else target, fov_deg, aspect, near, distance + 2 * GROUND_REACH * subject.radius
+    )
 
 
 def draw_picture(
@@ -119,8 +123,9 @@ def draw_picture(
 
 def _draw_ground(renderer: ImpostorRenderer, subject: Fan | Model, camera: Camera, settings: PictureSettings) -> None:
     low, high = subject.bounds
-    middle = (float((low[0] + high[0]) / 2), float(low[1]), float((low[2] + high[2]) / 2))
-    ground = Ground(np.array([0.0, 1.0, 0.0]), low[1])
+    level = float(low[1]) - GROUND_GAP * subject.radius
+    middle = (float((low[0] + high[0]) / 2), level, float((low[2] + high[2]) / 2))
+    ground = Ground(np.array([0.0, 1.0, 0.0]), level)
     if camera.toward_eye(np.array(middle))[1] <= 0:
         return
     reach = GROUND_REACH * subject.radius

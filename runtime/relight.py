@@ -21,7 +21,7 @@ ROW_DTYPE = np.dtype(
         ("gloss", "f4", (2,)),
     ]
 )
-TILE_DTYPE = np.dtype([("place", "f4", (4,)), ("origin", "f4", (3,))])
+TILE_DTYPE = np.dtype([("place", "f4", (4,)), ("part", "f4", (4,)), ("origin", "f4", (3,))])
 CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]], np.float32)
 
 
@@ -47,7 +47,8 @@ class ColormapPass:
     Attributes
     ----------
     texture : moderngl.Texture
-        (512, rows) float32 RGBA: entries 0-255 multiply the albedo, 256-511 are added on top.
+        (512, rows) float32 RGBA: linear entries 0-255 multiply the albedo, 256-511 are added
+        on top; of a fan with one albedo, 0-255 are the finished colours on the sRGB curve, and the rest is not used.
     """
 
     ROWS = 1024
@@ -102,7 +103,7 @@ class RelightPass:
         self._arrays = {name: self._array(ctx, name) for name in ("uniform", "textured", "normal")}
 
     def _array(self, ctx: moderngl.Context, name: str) -> moderngl.VertexArray:
-        layout = [(self._corners, "2f", "corner"), (self._tiles.buffer, "4f 3f/i", "place", "origin")]
+        layout = [(self._corners, "2f", "corner"), (self._tiles.buffer, "4f 4f 3f/i", "place", "part", "origin")]
         return ctx.vertex_array(load_program(ctx, "relight.vert", f"relight_{name}.frag"), layout)
 
     def draw(
@@ -112,14 +113,16 @@ class RelightPass:
         colormap: moderngl.Texture,
         cache: TileCache,
         normals: bool = False,
+        depth: bool = True,
     ) -> None:
         """Relight a TILE_DTYPE array of tiles; changes the bound framebuffer and texture units 0 to 3.
 
-        With `normals`, the colormap's colours are shown as they are, on every object.
+        With `normals`, the colormap's colours are shown as they are, on every object. Without `depth`, the tiles'
+        depth stays what it is.
         """
         array = self._arrays["normal" if normals else "uniform" if fan.one_texture else "textured"]
         self._tiles.write(tiles)
-        cache.target.use()
+        (cache.target if depth else cache.color_target).use()
         set_state()
         fan.normal.use(0)
         fan.depth.use(1)

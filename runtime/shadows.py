@@ -1,8 +1,8 @@
 """The shadow pass: strips of fans and triangles of meshes, marked on the ground and taken from its light once.
 
 The marks are a texture of the pass's own, one light a channel, and do what a stencil would: overlapping strips mark
-a pixel once. moderngl makes no framebuffer with a stencil, so few callers have one; and several lights fit in one
-texture, so that each takes away just the light it gave.
+a pixel once. moderngl makes no framebuffer with a stencil, so few callers have one; and all lights are marked before
+the ground is darkened, so that each takes away just the light it gave.
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ from impostor.lighting import DirectionalLight
 from impostor.shadow_projection import Ground, casts_shadow, ground_from_sight, strip_points
 from impostor.strips import silhouette_strips
 from runtime.gl_state import CallerState, clear_color, set_state
-from runtime.gpu import load_program, set_uniforms
+from runtime.gpu import check_texture_size, load_program, set_uniforms
 from runtime.instances import Instances, Quads, Viewer, nearest_views, quads_toward
 from runtime.meshes import MeshInstance, draw_parts
 from runtime.relight import InstanceBuffer
 
 CHANNELS = 4
+MOST_LIGHTS = 32  # that are marked together, as the shader's array has it
 ZERO, SOURCE_COLOR = 0x0000, 0x0300
 CASTER_DTYPE = np.dtype([("position_scale", "f4", (4,)), ("turn", "f4", (2,)), ("rows", "f4", (4, 4))])
 
@@ -108,8 +109,8 @@ class ShadowPass:
         casting = [
             index for index, share in enumerate(shares) if casts_shadow(lights[index].toward, ground) and share.any()
         ]
-        for start in range(0, len(casting), CHANNELS):
-            group = casting[start : start + CHANNELS]
+        for start in range(0, len(casting), MOST_LIGHTS):
+            group = casting[start : start + MOST_LIGHTS]
             corners = _ground_rectangle(fans, meshes, [lights[index] for index in group], ground)
             if corners is None:
                 continue
@@ -124,12 +125,14 @@ class ShadowPass:
         lights: Sequence[DirectionalLight],
         ground: Ground,
     ) -> None:
-        target = self._target_for(viewer)
+        target = self._target_for(viewer, -(-len(lights) // CHANNELS))
         target.use()
         set_state(color_mask=(True, True, True, True))
         clear_color()
-        for channel, light in enumerate(lights):
-            mask = tuple(channel == other for other in range(CHANNELS))
+        width, height = _size(viewer)
+        for index, light in enumerate(lights):
+            target.viewport = 0, index // CHANNELS * height, width, height
+            mask = tuple(index % CHANNELS == channel for channel in range(CHANNELS))
             everywhere = {
                 "clip_from_world": viewer.clip_from_world,
                 "ground": tuple(ground.plane),
@@ -170,22 +173,25 @@ class ShadowPass:
         state.bind_target()
         set_state(depth_test=True, blend=(ZERO, SOURCE_COLOR), polygon_offset=(-1.0, -4.0))
         self._marks.use(0)
-        share = np.zeros((CHANNELS, 3))
+        share = np.zeros((MOST_LIGHTS, 3))
         share[: len(shares)] = shares
         set_uniforms(
             self._darken_program,
             clip_from_world=viewer.clip_from_world,
             marks=0,
+            pictures=self._marks.height // _size(viewer)[1],
             mark_origin=viewer.viewport[:2],
             share=[tuple(row) for row in share.tolist()],
         )
         self._corners.write(corners.astype("f4").tobytes())
         self._darken.render(moderngl.TRIANGLE_STRIP)
 
-    def _target_for(self, viewer: Viewer) -> moderngl.Framebuffer:
-        size = (max(viewer.viewport[2], 1), max(viewer.viewport[3], 1))
+    def _target_for(self, viewer: Viewer, pictures: int) -> moderngl.Framebuffer:
+        width, height = _size(viewer)
+        size = (width, height * pictures)
         if self._marks is None or self._marks.size != size or self._target is None:
             self._release_target()
+            check_texture_size(self._ctx, f"shadows of {pictures * CHANNELS} lights", *size)
             self._marks = self._ctx.texture(size, CHANNELS)
             self._marks.filter = (moderngl.LINEAR, moderngl.LINEAR)
             self._marks.repeat_x = self._marks.repeat_y = False
@@ -211,6 +217,10 @@ class ShadowPass:
             resource.release()
         for program in (self._strip_program, self._mesh_program, self._darken_program):
             program.release()
+
+
+def _size(viewer: Viewer) -> tuple[int, int]:
+    return max(viewer.viewport[2], 1), max(viewer.viewport[3], 1)
 
 
 def _shares(lights: Sequence[DirectionalLight], ambient: ArrayLike, ground: Ground) -> list[NDArray[np.float64]]:

@@ -45,6 +45,7 @@ class TileCache:
         self.depth = ctx.texture((side, side), 1, dtype="nu2", alignment=2)
         self.depth.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self.target = ctx.framebuffer([self.color, self.depth])
+        self.color_target = ctx.framebuffer([self.color])
         self.clear()
 
     def clear(self) -> None:
@@ -101,5 +102,46 @@ class TileCache:
 
     def release(self) -> None:
         """Free the textures."""
-        for resource in (self.target, self.color, self.depth):
+        for resource in (self.target, self.color_target, self.color, self.depth):
             resource.release()
+
+
+class TileIndex:
+    """Which tiles of one fan are in the cache, found by number for many at once.
+
+    Attributes
+    ----------
+    places : ndarray, (M, 3) int32
+        x, y and side in the cache of every tile, in the order in which they were added.
+    versions : ndarray, (M,) int64
+        What each tile's picture was made with; below 0 as long as it has none.
+    """
+
+    def __init__(self):
+        self._keys, self._entries = np.empty(0, np.int64), np.empty(0, np.intp)
+        self.places, self.versions = np.empty((0, 3), np.int32), np.empty(0, np.int64)
+
+    def find(self, keys: NDArray[np.int64]) -> NDArray[np.intp]:
+        """Where tiles stand in `places`; -1 for those that are not there.
+
+        Parameters
+        ----------
+        keys : ndarray, (N,) int64
+
+        Returns
+        -------
+        ndarray, (N,) intp
+        """
+        if not len(self._keys):
+            return np.full(len(keys), -1, np.intp)
+        at = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
+        return np.where(self._keys[at] == keys, self._entries[at], -1)
+
+    def add(self, keys: NDArray[np.int64], places: NDArray[np.int32]) -> None:
+        """Take in tiles (N,) that are not there yet and their places (N, 3)."""
+        known = np.concatenate([self._keys, keys])
+        entries = np.concatenate([self._entries, np.arange(len(self.places), len(known))])
+        order = np.argsort(known)
+        self._keys, self._entries = known[order], entries[order]
+        self.places = np.concatenate([self.places, places])
+        self.versions = np.concatenate([self.versions, np.full(len(keys), -1)])

@@ -177,14 +177,14 @@ def _sums(samples):
     return blocks.sum(axis=(1, 3), dtype=float)
 
 
-def card_fan(pixels, half=1.0, depth=0.5, normal_codes=None) -> Fan:
-    """One view from +Z of a flat picture (S, S, 4) uint8 in the plane z = depth - 1/2, 2 `half` metres wide."""
+def card_fan(pixels, half=1.0, levels=1) -> Fan:
+    """One view from +Z of a flat picture (S, S, 4) uint8 that faces it in the plane z = 0, 2 `half` metres wide."""
     pixels = np.asarray(pixels, np.uint8)
     size = len(pixels)
-    codes = np.full((1, size, size), 112, np.uint8) if normal_codes is None else normal_codes
+    codes = tuple(np.full((1, size >> level, size >> level), 112, np.uint8) for level in range(levels))
     views = Views(np.eye(3)[None], np.zeros((1, 3)), np.array([half]), np.array([[-0.5, 0.5]]))
-    depths = np.full((1, size, size), round(depth * DEPTH_CODES), np.uint16)
-    return Fan("card", "ring", views, pixels[None], (codes,), depths, pixels[None, ..., 3] >= 128)
+    depths = np.full((1, size, size), DEPTH_CODES // 2, np.uint16)
+    return Fan("card", "ring", views, pixels[None], codes, depths, pixels[None, ..., 3] >= 128)
 
 
 def corner_card(size=16):

@@ -1,5 +1,7 @@
 #version 330
-// Entry c of a row: what multiplies the albedo of normal code c; entry 256 + c: what is added on top.
+// Entry c of a row: what multiplies the albedo of normal code c; entry 256 + c: what is added on top. Where there is
+// one albedo, entry c is the finished colour on the sRGB curve.
+#include "srgb.glsl"
 #include "lights.glsl"
 uniform sampler2D byte_to_normal;
 uniform bool show_normals;
@@ -24,7 +26,7 @@ void main() {
     vec3 diffuse, specular;
     shade(world, v_back, v_gloss, diffuse, specular);
     if (v_albedo.w > 0.0)
-        entry = vec4(column < 256 ? v_albedo.rgb * diffuse + specular : vec3(0.0), 1.0);
+        entry = vec4(srgb_from_linear(v_albedo.rgb * diffuse + specular), 1.0);
     else
         entry = vec4(column < 256 ? diffuse : specular, 1.0);
 }

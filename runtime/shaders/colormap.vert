@@ -16,5 +16,6 @@ void main() {
     v_back = back;
     v_albedo = albedo;
     v_gloss = gloss;
-    gl_Position = vec4(corner.x * 2.0 - 1.0, (row + corner.y) / float(row_count) * 2.0 - 1.0, 0.0, 1.0);
+    float width = albedo.w > 0.0 ? 1.0 : 2.0;
+    gl_Position = vec4(corner.x * width - 1.0, (row + corner.y) / float(row_count) * 2.0 - 1.0, 0.0, 1.0);
 }

@@ -3,20 +3,20 @@
 uniform sampler2D tiles;
 uniform sampler2D tile_depth;
 uniform float alpha_cutoff;
-in vec2 v_texel;
-in vec2 v_plane_zw;
-flat in vec2 v_eye_zw;
+in vec2 v_uv;
+flat in vec2 v_toward_eye;
 flat in vec4 v_bounds;
 in float v_depth_start;
 flat in float v_depth_span;
-uniform vec2 cache_size;
 out vec4 color;
 
 void main() {
-    vec2 texel = clamp(v_texel, v_bounds.xy, v_bounds.zw);
-    color = textureLod(tiles, texel / cache_size, 0.0);
+    vec2 uv = clamp(v_uv, v_bounds.xy, v_bounds.zw);
+    color = textureLod(tiles, uv, 0.0);
     if (color.a < alpha_cutoff) discard;
-    float z = v_depth_start + texelFetch(tile_depth, ivec2(texel), 0).r * v_depth_span;
-    vec2 zw = v_plane_zw + z * v_eye_zw;
-    gl_FragDepth = clamp(zw.x / zw.y, -1.0, 1.0) * 0.5 + 0.5;
+    // gl_FragCoord holds z / w and 1 / w of the quad; the surface lies this far from it, toward the eye.
+    float offset = (v_depth_start + textureLod(tile_depth, uv, 0.0).r * v_depth_span) * gl_FragCoord.w;
+    float w = 1.0 + offset * v_toward_eye.y;
+    // What reaches past the eye has no depth there; it is in front of everything.
+    gl_FragDepth = w > 0.0 ? clamp((gl_FragCoord.z + offset * v_toward_eye.x) / w, 0.0, 1.0) : 0.0;
 }

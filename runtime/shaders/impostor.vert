@@ -9,9 +9,8 @@ in vec3 toward_eye;   // world: what one metre of depth along the view's back mo
 in vec4 rectangle;    // the covered part of the tile: left, bottom, right, top in -1..1
 in vec3 place;        // x, y and side of the relit tile in the cache
 in vec4 depth;        // metres in front of the quad: at depth 0, from there to depth 1, and per unit of plane x and y
-out vec2 v_texel;
-out vec2 v_plane_zw;
-flat out vec2 v_eye_zw;
+out vec2 v_uv;
+flat out vec2 v_toward_eye;
 flat out vec4 v_bounds;
 out float v_depth_start;
 flat out float v_depth_span;
@@ -20,10 +19,10 @@ void main() {
     vec2 plane = mix(rectangle.xy, rectangle.zw, corner);
     gl_Position = clip_from_world * vec4(center + plane.x * right + plane.y * up, 1.0);
     // Row 0 of a tile is its top: the one flip between images and OpenGL.
-    v_texel = place.xy + (vec2(plane.x, -plane.y) * 0.5 + 0.5) * place.z;
-    v_bounds = vec4(place.xy + 0.5, place.xy + place.z - 0.5);
-    v_plane_zw = gl_Position.zw;
-    v_eye_zw = (clip_from_world * vec4(toward_eye, 0.0)).zw;
+    v_uv = (place.xy + (vec2(plane.x, -plane.y) * 0.5 + 0.5) * place.z) / cache_size;
+    v_bounds = vec4(place.xy + 0.5, place.xy + place.z - 0.5) / cache_size.xyxy;
+    vec4 step = clip_from_world * vec4(toward_eye, 0.0);
+    v_toward_eye = vec2(0.5 * (step.z + step.w), step.w);
     v_depth_start = depth.x + dot(plane, depth.zw);
     v_depth_span = depth.y;
 }

@@ -16,7 +16,7 @@ def cache(ctx):
 
 
 def squares(places):
-    return [set((x + i, y + j) for i in range(side) for j in range(side)) for x, y, side in places.tolist()]
+    return [{(x + i, y + j) for i in range(side) for j in range(side)} for x, y, side in places.tolist()]
 
 
 def test_places_never_overlap_and_stay_inside(cache):

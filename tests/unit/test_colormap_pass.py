@@ -1,0 +1,193 @@
+"""The colormap on the GPU: the same numbers as `impostor.lighting.colormap`, and written only when it must be."""
+
+import numpy as np
+import pytest
+
+from impostor.lighting import DirectionalLight, Gloss, colormap
+from impostor.views import basis_facing, direction, rotation_about_y
+from runtime.cameras import Camera
+from runtime.gl_state import preserved_state
+from runtime.lights import LightTable
+from runtime.relight import ROW_DTYPE, ColormapPass
+from tests.solids import BLUE, RED, Box, Sphere, solid_fan
+
+BASES = np.concatenate(
+    [basis_facing(direction([0.0, 1.3, -2.4], 0.26)) @ rotation_about_y(yaw).T for yaw in (0.0, 0.7, 3.0)]
+)
+RANDOM = np.random.default_rng(3)
+AMBIENT = (0.1, 0.2, 0.05)
+
+
+def lights(count):
+    toward = direction(RANDOM.uniform(-np.pi, np.pi, count), RANDOM.uniform(-1.5, 1.5, count))
+    return [DirectionalLight(tuple(each), tuple(RANDOM.uniform(0, 2 / count, 3))) for each in toward]
+
+
+@pytest.fixture
+def colormaps(ctx, screen):
+    made = ColormapPass(ctx)
+    yield made
+    made.release()
+
+
+@pytest.fixture
+def table(ctx):
+    made = LightTable(ctx)
+    yield made
+    made.release()
+
+
+def written(ctx, colormaps, table, rows, **options):
+    """The colormap texture (rows, 512, 4) after the rows of a ROW_DTYPE array were written."""
+    with preserved_state(ctx):
+        colormaps.write(rows, table, **options)
+    return np.frombuffer(colormaps.texture.read(), np.float32).reshape(-1, 512, 4)[rows["row"].astype(int)]
+
+
+def rows_for(bases, gloss, albedo=(1, 1, 1, 0)):
+    rows = np.zeros(len(bases), ROW_DTYPE)
+    rows["row"] = RANDOM.permutation(ColormapPass.ROWS)[: len(bases)]
+    rows["basis"], rows["albedo"] = bases, albedo
+    rows["gloss"] = gloss.strength, gloss.shininess
+    return rows
+
+
+@pytest.mark.parametrize("count", [0, 1, 3, 100])
+@pytest.mark.parametrize("gloss", [Gloss(), Gloss(0.4, 24.0)], ids=["matt", "glossy"])
+def test_the_gpu_equals_numpy(ctx, colormaps, table, count, gloss):
+    lit_by = lights(count)
+    table.update(lit_by, AMBIENT)
+    found = written(ctx, colormaps, table, rows_for(BASES, gloss))
+    expected = colormap(BASES, lit_by, AMBIENT, gloss)
+    assert np.abs(found[:, :256, :3] - expected.diffuse).max() < 1e-5
+    assert np.abs(found[:, 256:, :3] - expected.specular).max() < 1e-5
+    assert (expected.specular.max() > 0.05) == (count > 0 and gloss.strength > 0)
+
+
+def test_one_albedo_folds_everything_into_the_first_half(ctx, colormaps, table):
+    """So that one texture is enough: albedo * diffuse + specular."""
+    lit_by, gloss, albedo = lights(3), Gloss(0.3, 10.0), (0.5, 0.25, 1.0)
+    table.update(lit_by, AMBIENT)
+    found = written(ctx, colormaps, table, rows_for(BASES, gloss, (*albedo, 1)))
+    expected = colormap(BASES, lit_by, AMBIENT, gloss)
+    assert np.abs(found[:, :256, :3] - (expected.diffuse * albedo + expected.specular)).max() < 1e-5
+    assert not found[:, 256:, :3].any()
+    assert not found[:, 225:256].any()
+
+
+def test_a_full_texture_of_rows(ctx, colormaps, table):
+    table.update(lights(1), 0.0)
+    bases = basis_facing(direction(np.linspace(0, 6, ColormapPass.ROWS), 0.3))
+    found = written(ctx, colormaps, table, rows_for(bases, Gloss()))
+    expected = colormap(bases, table._held[0], 0.0)
+    assert np.abs(found[:, :256, :3] - expected.diffuse).max() < 1e-5
+
+
+def test_normals_as_colours_are_the_viewers(ctx, colormaps, table):
+    table.update([], 1.0)
+    viewer = basis_facing(direction(0.4, 0.1))
+    found = written(ctx, colormaps, table, rows_for(BASES, Gloss()), normals_for=viewer)
+    facing = viewer @ BASES[4].T @ [0, 0, 1]
+    np.testing.assert_allclose(found[4, 112, :3], facing / 2 + 0.5, atol=1e-6)
+
+
+FAN = solid_fan(Sphere(color=RED), views=8, size=32)
+PAINTED = solid_fan(Sphere(color=RED), Box((-1, -1, -1), (1, 0, 1), BLUE), views=8, size=32)
+
+
+def camera(azimuth):
+    made = Camera.orthographic((0, 0, 0), 4.0, azimuth, 0.0)
+    return made.clip_from_view, made.view_from_world
+
+
+class TestRelitOnlyWhenNeeded:
+    """`statistics["relit"]` counts the tiles that the last draw sent through a new colormap."""
+
+    @pytest.fixture
+    def drawn(self, renderer, screen):
+        def draw(azimuth=0.05, **options):
+            screen.clear()
+            renderer.draw(*camera(azimuth), **options)
+            return renderer.statistics["relit"], screen.color()
+
+        return draw
+
+    @pytest.mark.parametrize("fan", [FAN, PAINTED], ids=["uniform", "painted"])
+    def test_an_unchanged_scene_relights_nothing(self, renderer, drawn, fan):
+        renderer.add(fan, [(-2, 0, 0), (2, 0, 0)], [0.0, 1.0])
+        first, picture = drawn()
+        again, same = drawn()
+        assert (first, again) == (2, 0)
+        np.testing.assert_array_equal(picture, same)
+        assert drawn(azimuth=0.1)[0] == 0
+
+    @pytest.mark.parametrize("fan", [FAN, PAINTED], ids=["uniform", "painted"])
+    def test_every_change_of_light_is_seen(self, renderer, drawn, fan):
+        renderer.add(fan)
+        pictures = [drawn()[1]]
+        for lit_by, ambient in (
+            (lights(1), 0.25),
+            (lights(2), 0.25),
+            ([], 0.25),
+            ([], (0.3, 0.2, 0.1)),
+            ([DirectionalLight((0, 0, 1))], 0),
+        ):
+            renderer.lights, renderer.ambient = lit_by, ambient
+            relit, picture = drawn()
+            assert relit == 1
+            assert np.abs(pictures[-1].astype(int) - picture).max() > 3
+            pictures.append(picture)
+
+    def test_a_light_list_changed_in_place_is_seen(self, renderer, drawn):
+        renderer.add(FAN)
+        renderer.lights = [DirectionalLight((0, 0, 1))]
+        drawn()
+        renderer.lights.append(DirectionalLight((0, 1, 0)))
+        assert drawn()[0] == 1
+
+    def test_equal_lights_made_anew_are_no_change(self, renderer, drawn):
+        renderer.add(FAN)
+        renderer.lights, renderer.ambient = [DirectionalLight((0, 0, 1))], np.array([0.1, 0.2, 0.3])
+        drawn()
+        renderer.lights, renderer.ambient = (DirectionalLight((0, 0, 2)),), (0.1, 0.2, 0.3)
+        assert drawn()[0] == 0
+
+    def test_a_turn_and_another_view_are_seen(self, renderer, drawn):
+        copies = renderer.add(FAN, [(-2, 0, 0), (2, 0, 0)])
+        assert drawn()[0] == 1
+        copies.yaws[1] = 0.01
+        assert drawn()[0] == 1
+        assert drawn(azimuth=np.pi / 4)[0] == 2
+        # Both views are still in the cache.
+        assert drawn()[0] == 0
+
+    def test_moving_shrinking_and_hiding_relight_nothing(self, renderer, drawn):
+        copies = renderer.add(FAN, [(-2, 0, 0), (2, 0, 0)])
+        drawn()
+        copies.positions[:, 1] = 1
+        copies.scales[0] = 0.9
+        copies.visible[1] = False
+        assert drawn()[0] == 0
+        assert renderer.statistics["instances"] == 1
+
+    def test_a_copy_with_another_gloss_has_a_tile_of_its_own(self, renderer, drawn):
+        renderer.add(FAN, (-2, 0, 0))
+        renderer.add(FAN, (2, 0, 0), gloss=Gloss(0.5))
+        renderer.add(FAN, (0, 2, 0), gloss=Gloss(0.5))
+        assert drawn()[0] == 2
+
+    def test_going_to_another_output_and_back(self, renderer, drawn):
+        renderer.add(FAN)
+        _, lit = drawn()
+        for output in ("albedo", "normal"):
+            assert np.abs(drawn(output=output)[1].astype(int) - lit).max() > 20
+            np.testing.assert_array_equal(drawn()[1], lit)
+
+    def test_normals_turn_with_the_viewer(self, renderer, drawn):
+        """The same fan view, seen a little from the side: its normals lean."""
+        renderer.add(FAN)
+        _, front = drawn(azimuth=0.0, output="normal")
+        _, side = drawn(azimuth=0.3, output="normal")
+        front, side = (picture[29:35, 29:35, :3].mean(axis=(0, 1)) / 127.5 - 1 for picture in (front, side))
+        np.testing.assert_allclose(front[:2], 0, atol=0.02)
+        np.testing.assert_allclose(side, rotation_about_y(-0.3) @ front, atol=0.02)

@@ -1,0 +1,357 @@
+"""Shadows on the ground: strips of fans as NumPy projects them, meshes, and how much light each takes away."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import binary_dilation, binary_erosion, label
+from skimage.draw import polygon
+
+from impostor.lighting import DirectionalLight
+from impostor.shadow_projection import Ground, Quad, shadow_on_ground
+from impostor.srgb import srgb_from_linear
+from impostor.strips import silhouette_strips
+from impostor.views import direction
+from runtime import Instances
+from runtime.grounds import GroundSurface
+from runtime.instances import Viewer, nearest_views, quads_toward
+from runtime.offscreen import Offscreen
+from tests.pictures import apart, bluish, filling, greenish, iou, looking, placed
+from tests.solids import BLUE, GREEN, Box, Sphere, solid_fan, solid_model
+
+SIZE = 128
+LEVEL = Ground((0, 1, 0), 0.0)
+SLOPE = Ground((0.15, 1, -0.1), -0.2)
+WHITE = GroundSurface(albedo=(1, 1, 1), reach=1e4)
+# A ring on a stem, a ball beside it: holes, parts at different depths, feet on the ground.
+SOLIDS = (
+    Box((-0.25, 0, -0.25), (0.25, 0.6, 0.25)),
+    Box((-0.9, 0.5, -0.25), (0.9, 0.9, 0.25)),
+    Box((-0.9, 1.7, -0.25), (0.9, 2.1, 0.25)),
+    Box((-0.9, 0.8, -0.25), (-0.5, 1.8, 0.25)),
+    Box((0.5, 0.8, -0.25), (0.9, 1.8, 0.25)),
+    Sphere((0.8, 0.4, 0.9), 0.4),
+)
+RING = {"views": 32, "elevation_deg": 15.0, "size": 128}
+FAN = solid_fan(*SOLIDS, **RING)
+HIGH = {"views": 32, "elevation_deg": 60.0, "size": 128}
+VIEWERS = {
+    "orthographic": filling(2.4, 0.3, 0.5, (0.8, 0.5, -0.6)),
+    "perspective": looking((2, 4, 6), (0.8, 0.4, -0.6), 40),
+    "low": looking((-3, 1.4, 5), (0.6, 0.5, 0), 40),
+}
+
+
+@pytest.fixture
+def screen(ctx):
+    screen = Offscreen(ctx, SIZE, SIZE)
+    yield screen
+    screen.release()
+
+
+@pytest.fixture
+def ground(renderer, screen):
+    """The ground with its shadows, (SIZE, SIZE, 4) uint8, and without."""
+
+    def drawn(matrices, lights, plane=LEVEL, ambient=0.0, surface=WHITE):
+        renderer.lights, renderer.ambient = lights, ambient
+        screen.clear((0, 0, 0, 1))
+        renderer.draw_ground(*matrices, plane, surface)
+        bare = screen.color()
+        renderer.draw_shadows(*matrices, plane)
+        return screen.color(), bare
+
+    return drawn
+
+
+def shadowed(pictures, part=0.5):
+    """Where more than this part of the ground's light is gone."""
+    lit, bare = (picture[..., :3].max(axis=-1).astype(float) for picture in pictures)
+    return (bare > 0) & (lit < (1 - part) ** (1 / 2.2) * bare)
+
+
+def light_at(azimuth_deg, elevation_deg, color=(1, 1, 1)):
+    return DirectionalLight.from_angles(azimuth_deg, elevation_deg, color)
+
+
+def expected_mask(fan, place, matrices, light, plane):
+    """The strips' triangles, projected by NumPy and filled pixel by pixel."""
+    instances = Instances(fan, *place)
+    eye = Viewer.from_matrices(*matrices, (0, 0, SIZE, SIZE)).eye
+    quad = quads_toward(instances, eye)
+    light_view = int(nearest_views(instances, np.append(light.toward, 0), np.array([0]))[0][0])
+    strips = silhouette_strips(fan.silhouette[light_view])
+    shadow = shadow_on_ground(
+        strips,
+        fan.views[light_view],
+        fan.depth[light_view],
+        fan.views[int(quad.view[0])],
+        Quad(quad.center[0], quad.right[0], quad.up[0]),
+        world_from_model=placed(*place),
+        toward_light=light.toward,
+        eye=eye,
+        ground=plane,
+    )
+    clip = shadow @ (matrices[0] @ matrices[1]).T
+    pixels = (clip[:, :2] / clip[:, 3:] * (1, -1) + 1) / 2 * SIZE - 0.5
+    mask = np.zeros((SIZE, SIZE), bool)
+    for corners in pixels[strips.triangles()]:
+        mask[polygon(corners[:, 1], corners[:, 0], mask.shape)] = True
+    return mask
+
+
+class TestShape:
+    @pytest.mark.parametrize("viewer", VIEWERS)
+    @pytest.mark.parametrize("plane", [LEVEL, SLOPE], ids=["level", "slope"])
+    @pytest.mark.parametrize("place", [((0, 0, 0), 0.0, 1.0), ((0.4, 0.2, -0.5), 2.0, 0.7)], ids=["plain", "placed"])
+    @pytest.mark.parametrize("options", [{}, {"distance": 5.0}, {"slopes": (0.2, 0.3, -0.2)}], ids=str)
+    def test_the_gpu_projects_strips_as_numpy_does(self, renderer, ground, viewer, plane, place, options):
+        fan, light = solid_fan(*SOLIDS, **RING, **options), light_at(-50, 35)
+        renderer.add(fan, *place)
+        expected = expected_mask(fan, place, VIEWERS[viewer], light, plane)
+        found = shadowed(ground(VIEWERS[viewer], [light], plane))
+        assert expected.sum() > 500
+        # The edge is smoothed over a pixel; what is thinner than that is rounded away.
+        assert iou(found, expected) > (0.99 if expected.sum() > 4000 else 0.95)
+        assert not (found & ~binary_dilation(expected)).any()
+        assert not (binary_erosion(expected) & ~found).any()
+
+    @pytest.mark.parametrize("matrices", [filling(1.2, 0.1, 0.5, (0.5, 0, -0.2)), looking((1, 2, 4), (1, 0, -0.5), 30)])
+    def test_a_picture_full_of_shadow(self, renderer, ground, matrices):
+        place, light = ((0, 0, 0), 0.3, 1.0), light_at(-60, 30)
+        renderer.add(FAN, *place)
+        found = shadowed(ground(matrices, [light]))
+        assert found.sum() > 2000
+        assert iou(found, expected_mask(FAN, place, matrices, light, LEVEL)) > 0.99
+
+    @pytest.mark.parametrize("view", [0, 5, 20])
+    def test_it_is_the_meshs_shadow_when_the_light_is_a_views_own(self, renderer, ground, view):
+        """Seen from a fan camera, too; a strip's outline lies half a texel inside."""
+        azimuth = view * 360 / 32
+        matrices = filling(3.0, np.radians(azimuth + 56.25), np.radians(15), (0, 0.3, 0))
+        light = light_at(azimuth, 15)
+        fan = renderer.add(FAN)
+        strip = shadowed(ground(matrices, [light]))
+        renderer.remove(fan)
+        renderer.add_mesh(solid_model(*SOLIDS))
+        mesh = shadowed(ground(matrices, [light]))
+        assert mesh.sum() > 300
+        assert iou(strip, mesh) > 0.9
+
+    def test_a_mesh_shadow_is_the_mesh_pressed_along_the_light(self, renderer, ground):
+        """A unit cube under light from +X at 45 degrees: the map is the square and its copy one metre toward -X."""
+        renderer.add_mesh(solid_model(Box((-0.5, 0, -0.5), (0.5, 1, 0.5))), placed((0.25, 0, 0)))
+        found = shadowed(ground(filling(2.0, 0.0, np.pi / 2), [light_at(90, 45)]))
+        x = (np.arange(SIZE) + 0.5) / SIZE * 4 - 2
+        expected = (np.abs(x) < 0.5)[:, None] & ((x > -1.25) & (x < 0.75))[None, :]
+        assert iou(found, expected) > 0.98
+
+    @pytest.mark.parametrize("height", [0.0, 2.0])
+    def test_an_object_off_the_ground_casts_away_from_under_it(self, renderer, ground, height):
+        renderer.add_mesh(solid_model(Sphere((0, 0.5, 0), 0.5)), placed((1, height, 0)))
+        found = shadowed(ground(filling(3.0, 0.0, np.pi / 2), [light_at(90, 45)]))
+        _, columns = np.nonzero(found)
+        assert (columns.mean() + 0.5) / SIZE * 6 - 3 == pytest.approx(0.5 - height, abs=0.05)
+
+    @pytest.mark.parametrize("sink", [0.4, 0.8])
+    def test_what_is_buried_casts_no_shadow(self, renderer, ground, sink):
+        """A post in the ground shades as far as what stands out of it."""
+        fan = solid_fan(Box((-0.2, 0, -0.2), (0.2, 1, 0.2)), views=32, elevation_deg=30, size=64)
+        renderer.add(fan, (0, -sink, 0))
+        found = shadowed(ground(filling(2.0, 0.0, np.radians(30)), [light_at(90, 30)]))
+        _, columns = np.nonzero(found)
+        left, right = (np.array([columns.min(), columns.max() + 1]) / SIZE * 4 - 2).tolist()
+        assert left == pytest.approx(-0.2 - (1 - sink) / np.tan(np.radians(30)), abs=0.08)
+        assert right == pytest.approx(0.2, abs=0.08)
+
+    def test_shadows_reach_past_the_picture_in_a_grazing_light(self, renderer, ground):
+        """Thirty metres of shadow, and no triangle wraps around the eye."""
+        renderer.add(FAN)
+        found = shadowed(ground(looking((0, 1.7, 6), (0, 1, 0), 60, near=0.05, far=1000), [light_at(0, 3)]))
+        assert found.any()
+        assert not found[:40].any()
+
+
+class TestLight:
+    MATRICES = filling(2.5, 0.3, 0.9, (0, 0.3, 0))
+
+    @pytest.mark.parametrize("ambient", [0.0, 0.2, 0.6])
+    @pytest.mark.parametrize("albedo", [0.3, 1.0])
+    def test_the_shadow_is_the_ground_without_that_light(self, renderer, screen, ground, ambient, albedo):
+        light, surface = light_at(-50, 35, (0.5, 0.5, 0.5)), GroundSurface(albedo=(albedo,) * 3, reach=1e4)
+        renderer.add(FAN)
+        pictures = ground(self.MATRICES, [light], LEVEL, ambient, surface)
+        inside = binary_erosion(shadowed(ground(self.MATRICES, [light])), iterations=2)
+        assert inside.sum() > 100
+        expected = srgb_from_linear(albedo * ambient) * 255
+        assert np.abs(pictures[0][inside][:, :3] - expected).max() < 8
+
+    def test_overlapping_shadows_darken_once(self, renderer, ground):
+        """Strips of one fan at different depths, of two fans, and of a fan and a mesh."""
+        light, ambient = light_at(-50, 35, (0.8, 0.8, 0.8)), 0.2
+        renderer.add(FAN, [(0, 0, 0), (0.3, 0, 0.2)], [0.0, 1.0])
+        renderer.add_mesh(solid_model(*SOLIDS), placed((0.2, 0, 0.1)))
+        shaded, bare = ground(self.MATRICES, [light], LEVEL, ambient)
+        inside = binary_erosion(shaded[..., 0] < bare[..., 0] - 60, iterations=2)
+        assert inside.sum() > 400
+        assert np.ptp(shaded[inside][:, 0]) <= 1
+        assert shaded[..., 0].min() == shaded[inside][:, 0].min()
+
+    def test_each_light_takes_away_its_own_part(self, renderer, ground):
+        """Red from one side, blue from the other: red shadow, blue shadow, and both where they cross."""
+        ball = solid_fan(Sphere((0, 0.8, 0), 0.6), **HIGH)
+        renderer.add(ball)
+        red, blue = light_at(60, 50, (0.6, 0, 0)), light_at(-60, 50, (0, 0, 0.6))
+        top, sun = filling(2.5, 0.0, np.radians(60)), np.sin(np.radians(50))
+        shaded, bare = (picture.astype(int) for picture in ground(top, [red, blue], LEVEL, 0.2))
+        no_red, no_blue = (apart(shaded[..., [c]], bare[..., [c]]) > 30 for c in (0, 2))
+        assert no_red.sum() > 100 < no_blue.sum()
+        assert (shaded[..., 1] == bare[..., 1]).all()
+        both, one = no_red & no_blue, binary_erosion(no_red & ~no_blue, iterations=2)
+        assert both.any()
+        np.testing.assert_allclose(shaded[one][:, 2], bare[0, 0, 2], atol=1)
+        dark, light = srgb_from_linear(np.array([0.2, 0.2 + 0.6 * sun])) * 255
+        np.testing.assert_allclose(shaded[one][:, 0], dark, atol=5)
+        np.testing.assert_allclose(bare[0, 0, [0, 2]], light, atol=1)
+
+    @pytest.mark.parametrize("count", [4, 5, 9])
+    def test_many_lights_each_cast(self, renderer, ground, count):
+        """A ring of equal lights around a post: as many shadows, each with its share of the light gone."""
+        post = solid_fan(Box((-0.15, 0, -0.15), (0.15, 1, 0.15)), **HIGH)
+        renderer.add(post)
+        elevation = np.radians(60)
+        lights = [light_at(360 * index / count, 45, (0.9 / count,) * 3) for index in range(count)]
+        shaded, bare = (
+            picture[..., 0].astype(int) for picture in ground(filling(2.0, 0.0, elevation), lights, LEVEL, 0.1)
+        )
+        sun = 0.9 * np.sin(np.radians(45))
+        expected = srgb_from_linear(0.1 + sun * (count - 1) / count) * 255
+        angles = np.radians(360 * np.arange(count) / count) + np.pi
+        for angle in angles:
+            x, y = np.sin(angle) * 0.75, np.cos(angle) * 0.75 * np.sin(elevation)
+            row, column = int((y / 2 + 1) / 2 * SIZE), int((x / 2 + 1) / 2 * SIZE)
+            assert shaded[row, column] == pytest.approx(expected, abs=4)
+            assert shaded[row, column] < bare[row, column]
+
+    def test_where_all_shadows_meet_only_ambient_light_is_left(self, renderer, ground):
+        """Six lights, more than one pass marks at once, all hidden by a roof."""
+        renderer.add_mesh(solid_model(Box((-3, 1, -3), (3, 1.1, 3))))
+        lights = [light_at(60 * index, 60, (0.15, 0.15, 0.15)) for index in range(6)]
+        shaded, _ = ground(looking((0, 0.9, 0.01), (0, 0, 0), 60), lights, LEVEL, 0.1)
+        np.testing.assert_allclose(shaded[64, 64, :3], srgb_from_linear(0.1) * 255, atol=8)
+
+    @pytest.mark.parametrize("lights", [[], [light_at(30, -20)], [light_at(30, 0)], [light_at(30, 40, (0, 0, 0))]])
+    def test_no_light_that_reaches_the_ground_no_shadow(self, renderer, ground, lights):
+        renderer.add(FAN)
+        renderer.add_mesh(solid_model(*SOLIDS))
+        shaded, bare = ground(self.MATRICES, lights, LEVEL, 0.5)
+        np.testing.assert_array_equal(shaded, bare)
+
+    @pytest.mark.parametrize("matrices", [filling(2.5, 0.3, -0.5), looking((2, -1, 5)), filling(2.5, 0.3, 0.0)])
+    def test_from_under_the_ground_no_shadow_is_seen(self, renderer, ground, matrices):
+        renderer.add(FAN)
+        shaded, bare = ground(matrices, [light_at(30, 40)])
+        np.testing.assert_array_equal(shaded, bare)
+
+    def test_hidden_copies_and_nothing_cast_nothing(self, renderer, ground):
+        shaded, bare = ground(self.MATRICES, [light_at(30, 40)])
+        np.testing.assert_array_equal(shaded, bare)
+        renderer.add(FAN).visible[:] = False
+        renderer.add(FAN, np.zeros((0, 3)))
+        shaded, bare = ground(self.MATRICES, [light_at(30, 40)])
+        np.testing.assert_array_equal(shaded, bare)
+
+    def test_the_alpha_of_the_picture_is_left_alone(self, renderer, ground):
+        renderer.add(FAN)
+        shaded, _ = ground(self.MATRICES, [light_at(30, 40)])
+        assert (shaded[..., 3] == 255).all()
+
+
+class TestInTheScene:
+    @pytest.mark.parametrize("turn", [0.0, 0.5, 0.9])
+    @pytest.mark.parametrize("rise_deg", [0, 5, 15])
+    @pytest.mark.parametrize("sun_deg", [-70, 110])
+    def test_the_shadow_meets_the_feet(self, renderer, screen, ground, turn, rise_deg, sun_deg):
+        """A post seen from between two fan cameras and above them: post and shadow are in one piece."""
+        post = solid_fan(Box((-0.12, 0, -0.12), (0.12, 1.2, 0.12), GREEN), **RING)
+        renderer.add(post)
+        azimuth, elevation = turn * 2 * np.pi / 32, np.radians(15 + rise_deg)
+        for matrices in (
+            filling(1.6, azimuth, elevation, (0, 0.4, 0)),
+            looking(9 * direction(azimuth, elevation), (0, 0.4, 0), 20),
+        ):
+            shadow = shadowed(ground(matrices, [light_at(sun_deg, 40)]), 0.3)
+            renderer.draw(*matrices, output="albedo")
+            body = greenish(screen.color())
+            assert label(shadow)[1] == 1
+            assert label(body | shadow, np.ones((3, 3)))[1] == 1
+            contact = binary_dilation(body, np.ones((3, 3))) & shadow
+            rows, _ = np.nonzero(body)
+            assert contact.sum() >= 5
+            assert np.nonzero(contact)[0].max() > rows.max() - 12
+
+    def test_what_stands_before_a_shadow_hides_it(self, renderer, screen):
+        matrices = VIEWERS["perspective"]
+        renderer.lights, renderer.ambient = [light_at(-20, 35)], 0.1
+        renderer.add(FAN, (0, 0, 0))
+        wall = renderer.add_mesh(solid_model(Box((-1, 0, 1.5), (1.5, 1.0, 1.6), BLUE)))
+
+        def picture(with_shadows):
+            screen.clear((0, 0, 0, 1))
+            renderer.draw_ground(*matrices, LEVEL, WHITE)
+            renderer.draw_meshes(*matrices, output="albedo")
+            if with_shadows:
+                renderer.draw_shadows(*matrices, LEVEL)
+            return screen.color()
+
+        before, after = picture(False), picture(True)
+        # Where it touches the ground it is as deep as the ground.
+        hidden = binary_erosion(bluish(before), iterations=3)
+        assert hidden.sum() > 300
+        np.testing.assert_array_equal(after[hidden], before[hidden])
+        renderer.remove(wall)
+        assert (apart(picture(True), picture(False))[hidden] > 60).sum() > 50
+
+    def test_depth_is_not_written(self, renderer, screen, ground):
+        renderer.add(FAN)
+        ground(VIEWERS["perspective"], [light_at(-50, 35)])
+        shaded = screen.depth()
+        renderer.remove(renderer._batches[0].instances)
+        ground(VIEWERS["perspective"], [light_at(-50, 35)])
+        np.testing.assert_array_equal(screen.depth(), shaded)
+
+    def test_a_shadow_has_no_holes_whatever_the_depth_buffers_range(self, renderer, ground):
+        """The ground's own depth never comes before the darkening of it."""
+        renderer.add(solid_fan(Sphere((0, 1, 0)), **RING), scales=3)
+        for near, far in ((0.01, 1e4), (1, 50)):
+            for elevation in (0.05, 0.3, 1.0):
+                matrices = looking(20 * direction(0.2, elevation), (0, 0, 0), 40, near, far)
+                found = shadowed(ground(matrices, [light_at(120, 50)]))
+                assert found.sum() > 20
+                assert label(~found)[1] == 1
+
+    def test_in_a_viewport_inside_a_larger_framebuffer(self, ctx, renderer, ground):
+        renderer.add(FAN)
+        matrices = VIEWERS["perspective"]
+        expected, _ = ground(matrices, [light_at(-50, 35)])
+        wide = Offscreen(ctx, 200, 150)
+        wide.clear((0, 0, 0, 1))
+        wide.framebuffer.viewport = (61, 9, SIZE, SIZE)
+        renderer.draw_ground(*matrices, LEVEL, WHITE)
+        renderer.draw_shadows(*matrices, LEVEL)
+        pixels = wide.color()
+        wide.release()
+        np.testing.assert_array_equal(pixels[150 - 9 - SIZE : 150 - 9, 61 : 61 + SIZE], expected)
+
+    def test_a_forest_is_the_shadows_of_its_trees(self, renderer, ground):
+        """Copies that share a view of the light, and copies that do not, in one call and one by one."""
+        random = np.random.default_rng(4)
+        positions, yaws = random.uniform(-2, 2, (12, 3)) * (1, 0, 1), np.repeat([0.0, 1.0, 2.5], 4)
+        light, matrices = light_at(-50, 50), filling(4.0, 0.3, 0.8)
+        renderer.add(FAN, positions, yaws, 0.6)
+        together = shadowed(ground(matrices, [light]))
+        renderer.remove(renderer._batches[0].instances)
+        alone = np.zeros_like(together)
+        for position, yaw in zip(positions, yaws, strict=True):
+            tree = renderer.add(FAN, position, yaw, 0.6)
+            alone |= shadowed(ground(matrices, [light]))
+            renderer.remove(tree)
+        assert iou(together, alone) > 0.95
