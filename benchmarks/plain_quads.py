@@ -39,7 +39,7 @@ BILINEAR, TRILINEAR = "textureLod(picture, v_uv, 0.0)", "texture(picture, v_uv)"
 
 
 class PlainQuads:
-    """Draws the quads of a field's last frame from a copy of its relit tiles, without state kept or depth written a pixel.
+    """Draws the quads of a field's last frame from a copy of its relit tiles, at the quads' own depth.
 
     The records come from the impostor pass itself, so the rectangles and their order are the same.
 

@@ -106,7 +106,7 @@ class Field:
         self.renderer = ImpostorRenderer(ctx)
         self.renderer.add(fan, self.placement.positions, self.placement.yaws)
         self.renderer.lights, self.renderer.ambient = lights(1), AMBIENT
-        self._turn = 0.0
+        self._turn, self._shift = 0.0, 1e-3 * float(fan.views.radius.mean())
 
     def empty(self) -> None:
         """A frame of nothing."""
@@ -129,6 +129,14 @@ class Field:
         self.renderer.lights = lights(len(self.renderer.lights), self._turn)
         self.impostors()
 
+    def impostors_moving(self) -> None:
+        """A frame of impostors for a viewer who shifts a little from frame to frame."""
+        self._shift = -self._shift
+        view_from_world = self.matrices[1].copy()
+        view_from_world[0, 3] += self._shift
+        self.target.clear(BACKGROUND)
+        self.renderer.draw(self.matrices[0], view_from_world)
+
     def release(self) -> None:
         """Free everything on the GPU."""
         self.renderer.release()
@@ -150,14 +158,15 @@ class MeshField:
         matrices = np.tile(np.eye(4), (field.count, 1, 1))
         matrices[:, :3, :3] = rotation_about_y(field.placement.yaws)
         matrices[:, :3, 3] = field.placement.positions
-        for matrix in matrices:
-            self._renderer.add_mesh(model, matrix)
+        self._placed = [self._renderer.add_mesh(model, matrix) for matrix in matrices]
 
-    def meshes(self) -> None:
-        """A frame of meshes without shadows."""
+    def meshes(self, count: int) -> None:
+        """A frame of the first `count` meshes without shadows."""
+        self._renderer._meshes = self._placed[:count]
         self._field.target.clear(BACKGROUND)
         self._renderer.draw_meshes(*self._field.matrices)
 
     def release(self) -> None:
         """Free everything on the GPU."""
+        self._renderer._meshes = self._placed
         self._renderer.release()

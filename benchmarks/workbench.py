@@ -18,6 +18,7 @@ from runtime.gpu import make_context
 
 DATA = Path(os.environ.get("IMPOSTOR_DATA") or ROOT.parent / "shared" / "data")
 SAMPLES = ROOT / "sample_models"
+COMMAND = Path(sys.executable).with_name("impostor")
 
 
 @dataclass(frozen=True)
@@ -83,12 +84,12 @@ class Workbench:
         return self._models[key]
 
     def bake_cost(self, key: str) -> Cost:
-        """Bakes 96 views of 256 texels in a fresh process."""
+        """`impostor bake MODEL` with the defaults, 96 views of 256 texels, in a fresh process."""
         if key not in self._costs:
             path = self.subject(key).path
             say(f"baking {path.name}")
-            script = [sys.executable, "-m", "benchmarks.bake_one"]
-            self._costs[key] = run_fresh([*script, str(path), str(self.fan_path(key))])
+            command = [str(COMMAND), "bake", str(path), "-o", str(self.fan_path(key)), "--quiet", "--force"]
+            self._costs[key] = run_fresh(command)
         return self._costs[key]
 
     def fan_path(self, key: str) -> Path:

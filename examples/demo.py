@@ -1,6 +1,6 @@
 """From a mesh to a relit impostor, with pictures of every step: `make demo`.
 
-    python examples/demo.py [MODEL] [--views 96] [--size 256] [--out demo_output]
+    python examples/demo.py [MODEL] [--views 96] [--size 384] [--out demo_output]
 
 Bakes a model into a fan with the functions that the command line calls, then writes into the folder
 
@@ -37,12 +37,12 @@ from runtime.pictures import PictureSettings, draw_picture, orbit_camera
 
 ROOT = Path(__file__).resolve().parents[1]
 SUNS = (  # azimuth and elevation in degrees, linear colour
-    (-70, 14, (1.25, 0.70, 0.35)),
-    (-25, 35, (0.95, 0.88, 0.75)),
-    (60, 45, (0.90, 0.90, 0.90)),
-    (110, 20, (1.15, 0.62, 0.38)),
+    (-60, 18, (2.1, 1.30, 0.70)),
+    (-38, 34, (1.3, 1.22, 1.10)),
+    (75, 36, (1.2, 1.20, 1.20)),
+    (118, 20, (1.9, 1.10, 0.75)),
 )
-AMBIENT = (0.12, 0.14, 0.18)
+AMBIENT = (0.16, 0.19, 0.25)
 
 
 def relit(ctx, fan: Fan, side: int) -> NDArray[np.uint8]:
@@ -84,7 +84,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("model", type=Path, nargs="?", default=ROOT / "sample_models" / "statue.glb", metavar="MODEL")
     parser.add_argument("--views", type=int, default=96)
-    parser.add_argument("--size", type=int, default=256, metavar="TEXELS")
+    parser.add_argument("--size", type=int, default=384, metavar="TEXELS")
     parser.add_argument("--out", type=Path, default=ROOT / "demo_output", metavar="FOLDER")
     options = parser.parse_args(arguments)
     started = time.monotonic()
@@ -107,7 +107,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     sheet, suns, comparison = pictures.values()
     ctx = make_context()
     write_contact_sheet(fan, sheet, force=True)
-    save_png(suns, relit(ctx, fan, side=max(320, options.size)), force=True)
+    save_png(suns, relit(ctx, fan, side=fan.size), force=True)
     picture, psnr = compared(ctx, fan, model)
     save_png(comparison, picture, force=True)
     index = options.out / "index.html"

@@ -16,6 +16,7 @@ import typer
 from impostor.errors import ImpostorError, ModelWarning, OutputError, SettingsError
 from impostor.files.output import check_output
 
+INTERRUPTED = 130  # what Typer, and every shell, makes of Ctrl-C
 EPILOG = "Exit codes: 0 done, 1 failed, 2 wrong usage. Angles are in degrees, azimuth from +Z toward +X."
 
 
@@ -47,10 +48,14 @@ def main(arguments: list[str] | None = None) -> int:
     int
         The exit code.
     """
+    arguments = sys.argv[1:] if arguments is None else arguments
     notices: list[str] = []
     try:
+        command = typer.main.get_command(make_app())
         with _held_warnings(notices):
-            code = typer.main.get_command(make_app()).main(arguments, "impostor", standalone_mode=False) or 0
+            code = command.main(arguments or ["--help"], "impostor", standalone_mode=False) or 0
+        if code == INTERRUPTED:
+            return _fail("stopped", INTERRUPTED)
         for notice in notices:
             print(f"impostor: warning: {notice}", file=sys.stderr)
         return code
@@ -61,7 +66,7 @@ def main(arguments: list[str] | None = None) -> int:
     except typer.TyperException as error:
         return _fail(_usage_problem(error), 2)
     except (KeyboardInterrupt, typer.Abort):
-        return _fail("stopped", 130)
+        return _fail("stopped", INTERRUPTED)
     except MemoryError:
         return _fail("not enough memory; expected room for all views: a smaller --size or fewer --views take less", 1)
     except BrokenPipeError:
@@ -75,7 +80,6 @@ def make_app() -> typer.Typer:
     """Every command of every installed stage."""
     app = typer.Typer(
         add_completion=False,
-        no_args_is_help=True,
         rich_markup_mode=None,
         epilog=EPILOG,
         pretty_exceptions_enable=False,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,6 +16,8 @@ from impostor.cli import AsJson, BakedUpAxis, Force, Quiet, UpAxis, check_name, 
 from impostor.errors import ModelWarning, SettingsError
 
 if TYPE_CHECKING:
+    import moderngl
+
     from impostor.fan import Fan
     from impostor.lighting import DirectionalLight, Gloss
     from impostor.model import Model
@@ -57,7 +60,6 @@ def render(
     force: Force = False,
 ) -> None:
     """Draw a fan, or a mesh through the same camera and lights, as a PNG."""
-    from runtime.gpu import make_context
     from runtime.offscreen import save_png
     from runtime.pictures import PictureSettings, draw_picture
 
@@ -78,7 +80,8 @@ def render(
     viewpoint = _viewpoint(azimuth, elevation, eye, target, fov)
     check_name(output_file, ".png", force)
     loaded = _load(subject, up)
-    pixels = draw_picture(make_context(), loaded, viewpoint(loaded, width / height), settings)
+    with _context() as ctx:
+        pixels = draw_picture(ctx, loaded, viewpoint(loaded, width / height), settings)
     save_png(output_file, pixels, force=force)
 
 
@@ -105,7 +108,6 @@ def compare(
     from impostor.model import load_model
     from runtime.compare import Comparison, side_by_side
     from runtime.compare import as_json as rows_as_json
-    from runtime.gpu import make_context
     from runtime.offscreen import save_png
     from runtime.renderer import DEFAULT_LIGHTS
 
@@ -123,12 +125,12 @@ def compare(
     if fan.source.get("sha256") not in (None, model.source_hash):
         baked_from = f"{fan_file} was baked from another ({fan.source.get('name')})"
         warnings.warn(f"{model_file}: is not what the fan shows: {baked_from}", ModelWarning, stacklevel=1)
-    comparison = Comparison(make_context(), fan, model, size, lights)
-    try:
-        with progress_bar("comparing", quiet) as progress:
+    with _context() as ctx, progress_bar("comparing", quiet) as progress:
+        comparison = Comparison(ctx, fan, model, size, lights)
+        try:
             measured = list(comparison.rows(angles, cameras, method, progress))
-    finally:
-        comparison.release()
+        finally:
+            comparison.release()
     rows = [row for row, _ in measured]
     if picture is not None:
         save_png(picture, side_by_side([pair for _, pair in measured]), force=force)
@@ -139,6 +141,18 @@ def compare(
     for row in rows:
         values = f"{row.psnr_db:8.2f} {row.ssim:7.4f} {row.flip:7.4f} {row.iou:7.4f}"
         print(f"{row.method:10} {row.offset_deg:7g} {values}")
+
+
+@contextmanager
+def _context() -> Iterator[moderngl.Context]:
+    """A context for one command."""
+    from runtime.gpu import make_context
+
+    ctx = make_context()
+    try:
+        yield ctx
+    finally:
+        ctx.release()
 
 
 def _load(path: Path, up: str) -> Fan | Model:

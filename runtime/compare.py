@@ -154,7 +154,7 @@ def errors(pair: Pair) -> tuple[float, float, float, float]:
     psnr = -10 * np.log10(max(square, 10 ** (-HIGHEST_PSNR / 10)))
     window = min(SSIM_WINDOW, min(truth.shape[:2]) - 1 | 1)
     similarity = structural_similarity(truth, shown, channel_axis=2, data_range=1, full=True, win_size=window)[1]
-    flip_map = evaluate(truth, shown, "LDR")[0]
+    flip_map = evaluate(truth, shown, "LDR", applyMagma=False)[0]
     return psnr, float(similarity[pixels].mean()), float(flip_map[pixels].mean()), iou
 
 

@@ -186,14 +186,14 @@ def set_state(
     polygon_offset: tuple[float, float] | None = None,
     color_mask: tuple[bool, bool, bool, bool] | None = None,
 ) -> None:
-    """Set every switch that a pass relies on; what is not named is off. Depth compares with LEQUAL."""
+    """Set every switch that a pass relies on; what is not named is off. Depth compares with LESS."""
     for name in (_STENCIL_TEST, _FRAMEBUFFER_SRGB, _RASTERIZER_DISCARD, _SAMPLE_ALPHA_TO_COVERAGE):
         _switch(name, False)
     for name in (_COLOR_LOGIC_OP, _DEPTH_CLAMP):
         _switch(name, False)
     _call("glPolygonMode", _FRONT_AND_BACK, _FILL)
     _switch(_DEPTH_TEST, depth_test)
-    _call("glDepthFunc", 0x0203)
+    _call("glDepthFunc", 0x0201)
     _call("glDepthMask", int(depth_write))
     _switch(_BLEND, blend is not None)
     if blend is not None:

@@ -17,6 +17,7 @@ from impostor.fan import Fan
 from impostor.lighting import DirectionalLight
 from impostor.shadow_projection import Ground, casts_shadow, ground_from_sight, strip_points
 from impostor.strips import silhouette_strips
+from impostor.views import rotation_about_y
 from runtime.gl_state import CallerState, clear_color, set_state
 from runtime.gpu import check_texture_size, load_program, set_uniforms
 from runtime.instances import Instances, Quads, Viewer, nearest_views, quads_toward
@@ -25,8 +26,13 @@ from runtime.relight import InstanceBuffer
 
 CHANNELS = 4
 MOST_LIGHTS = 32  # that are marked together, as the shader's array has it
+SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])  # as a triangle strip
+FARTHEST = 1 - 1e-6  # in clip space: short of a far plane at infinity
 ZERO, SOURCE_COLOR = 0x0000, 0x0300
 CASTER_DTYPE = np.dtype([("position_scale", "f4", (4,)), ("turn", "f4", (2,)), ("rows", "f4", (4, 4))])
+
+
+CastingFan = tuple[Instances, Quads, NDArray[np.void]]
 
 
 class StripBuffers:
@@ -109,17 +115,21 @@ class ShadowPass:
         casting = [
             index for index, share in enumerate(shares) if casts_shadow(lights[index].toward, ground) and share.any()
         ]
+        shown = [(instances, quads_toward(instances, viewer.eye)) for instances in fans]
+        casting_fans = [
+            (instances, seen, _casters(instances, seen, viewer, ground)) for instances, seen in shown if len(seen)
+        ]
         for start in range(0, len(casting), MOST_LIGHTS):
-            group = casting[start : start + MOST_LIGHTS]
-            corners = _ground_rectangle(fans, meshes, [lights[index] for index in group], ground)
+            group = [lights[index] for index in casting[start : start + MOST_LIGHTS]]
+            corners = _ground_rectangle(casting_fans, meshes, viewer, group, ground)
             if corners is None:
                 continue
-            self._mark(fans, meshes, viewer, [lights[index] for index in group], ground)
-            self._darken_ground(state, viewer, corners, [shares[index] for index in group])
+            self._mark(casting_fans, meshes, viewer, group, ground)
+            self._darken_ground(state, viewer, corners, [shares[index] for index in casting[start:]][: len(group)])
 
     def _mark(
         self,
-        fans: Sequence[Instances],
+        fans: Sequence[CastingFan],
         meshes: Sequence[MeshInstance],
         viewer: Viewer,
         lights: Sequence[DirectionalLight],
@@ -141,8 +151,8 @@ class ShadowPass:
             if fans:
                 set_uniforms(self._strip_program, **everywhere)
                 set_state(color_mask=mask)  # type: ignore[arg-type]
-                for instances in fans:
-                    self._mark_fan(instances, viewer, light, ground)
+                for fan in fans:
+                    self._mark_fan(*fan, light)
             if meshes:
                 set_uniforms(self._mesh_program, **everywhere)
                 for mesh in meshes:
@@ -150,20 +160,15 @@ class ShadowPass:
                     set_state(color_mask=mask)  # type: ignore[arg-type]
                     draw_parts(self._ctx, mesh.buffers, self._mesh_program, depth=False)
 
-    def _mark_fan(self, instances: Instances, viewer: Viewer, light: DirectionalLight, ground: Ground) -> None:
-        seen = quads_toward(instances, viewer.eye)
-        if not len(seen):
-            return
+    def _mark_fan(self, instances: Instances, seen: Quads, casters: NDArray[np.void], light: DirectionalLight) -> None:
         light_views, _ = nearest_views(instances, np.append(light.toward, 0.0), seen.index)
         order = np.argsort(light_views, kind="stable")
-        casters = _casters(instances, seen.take(order), viewer, ground)
+        casters = casters[order]
         views, first, count = np.unique(light_views[order], return_index=True, return_counts=True)
-        self._casters.write(casters)
         for view, start, number in zip(views, first, count, strict=True):
             array = self._strips.vertex_array(instances.fan, int(view))
             if array is not None:
-                if len(views) > 1:
-                    self._casters.write(casters[start : start + number])
+                self._casters.write(casters[start : start + number])
                 array.render(moderngl.TRIANGLES, instances=int(number))
 
     def _darken_ground(
@@ -258,41 +263,62 @@ def _casters(instances: Instances, seen: Quads, viewer: Viewer, ground: Ground) 
 
 
 def _ground_rectangle(
-    fans: Sequence[Instances],
+    fans: Sequence[CastingFan],
     meshes: Sequence[MeshInstance],
+    viewer: Viewer,
     lights: Sequence[DirectionalLight],
     ground: Ground,
 ) -> NDArray[np.floating] | None:
-    """Corners (4, 3), as a triangle strip, of a rectangle on the ground that holds every shadow; None without any."""
-    spheres = [_mesh_sphere(mesh) for mesh in meshes]
-    for instances in fans:
-        views = instances.fan.views
-        reach = np.linalg.norm(views.center, axis=-1).max() + views.radius.max() * 2
-        shown = instances.visible
-        spheres += [
-            (place, reach * scale)
-            for place, scale in zip(instances.positions[shown], instances.scales[shown], strict=True)
-        ]
-    if not spheres:
+    """Corners (4, 3), as a triangle strip, of a rectangle on the ground that holds every shadow that can be seen.
+
+    None where there is none.
+    """
+    placed = [(*_fan_spheres(instances, seen), casters["rows"]) for instances, seen, casters in fans]
+    placed += [(*_mesh_sphere(mesh), np.eye(4)[None]) for mesh in meshes]
+    if not placed:
         return None
-    centers, radii = np.array([place for place, _ in spheres]), np.array([radius for _, radius in spheres])
+    centers, radii, moved = (np.concatenate(parts) for parts in zip(*placed, strict=True))
     tangent = np.cross(ground.normal, np.eye(3)[np.argmin(np.abs(ground.normal))])
-    axes = np.stack([tangent / np.linalg.norm(tangent), np.cross(ground.normal, tangent / np.linalg.norm(tangent))])
-    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    tangent /= np.linalg.norm(tangent)
+    axes = np.stack([tangent, np.cross(ground.normal, tangent)])
+    low, high = _seen_ground(viewer, axes)
+    found = []
     for light in lights:
         slope = np.array(light.toward) / (ground.normal @ light.toward)
         height = centers @ ground.normal - ground.offset
-        middle = (centers - height[:, None] * slope) @ axes.T
         # A sphere's shadow is longer than it is wide by the light's slope.
-        reach = (radii * (np.linalg.norm(slope) + 1))[:, None]
-        low = np.minimum(low, (middle - reach).min(axis=0))
-        high = np.maximum(high, (middle + reach).max(axis=0))
-    corners = np.array([[low[0], low[1]], [high[0], low[1]], [low[0], high[1]], [high[0], high[1]]])
-    return corners @ axes + ground.offset * ground.normal
+        reach = radii * (np.linalg.norm(slope) + 1)
+        square = (centers - height[:, None] * slope)[:, None] + reach[:, None, None] * (SQUARE @ axes)
+        # Where the viewer is shown it: steps 3 to 5 move what the true shadow covers.
+        shown = np.einsum("nij,nkj->nki", moved[..., :3], square) + moved[:, None, :, 3]
+        weight = shown[..., 3]
+        flat = shown[..., :3] @ axes.T / np.where(weight > 0, weight, 1)[..., None]
+        endless = (weight <= 0).any(axis=1)[:, None]
+        found.append(np.where(endless, -np.inf, flat.min(axis=1)).min(axis=0))
+        found.append(np.where(endless, np.inf, flat.max(axis=1)).max(axis=0))
+    low, high = np.maximum(low, np.min(found, axis=0)), np.minimum(high, np.max(found, axis=0))
+    if np.any(low >= high):
+        return None
+    return np.where(SQUARE > 0, high, low) @ axes + ground.offset * ground.normal
 
 
-def _mesh_sphere(mesh: MeshInstance) -> tuple[NDArray[np.float64], float]:
+def _seen_ground(viewer: Viewer, axes: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Least and greatest coordinates (2,) along two world axes that lie in the viewer's frustum."""
+    corners = np.array([[x, y, z, 1.0] for x in (-1, 1) for y in (-1, 1) for z in (-1, FARTHEST)])
+    points = corners @ np.linalg.inv(viewer.clip_from_world).T
+    flat = points[:, :3] / points[:, 3:] @ axes.T
+    return flat.min(axis=0), flat.max(axis=0)
+
+
+def _fan_spheres(instances: Instances, seen: Quads) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    low, high = instances.fan.bounds
+    turned = np.einsum("nij,j->ni", rotation_about_y(instances.yaws[seen.index]), (low + high) / 2)
+    return instances.positions[seen.index] + seen.scale[:, None] * turned, seen.scale * np.linalg.norm(high - low) / 2
+
+
+def _mesh_sphere(mesh: MeshInstance) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     low, high = mesh.buffers.model.bounds
     matrix = np.asarray(mesh.world_from_model, float)
     center = matrix[:3, :3] @ ((low + high) / 2) + matrix[:3, 3]
-    return center, float(np.linalg.norm(high - low) / 2 * np.abs(np.linalg.det(matrix[:3, :3])) ** (1 / 3))
+    scale = np.abs(np.linalg.det(matrix[:3, :3])) ** (1 / 3)
+    return center[None], np.array([np.linalg.norm(high - low) / 2 * scale])

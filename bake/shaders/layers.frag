@@ -51,7 +51,7 @@ void main() {
     albedo *= vertex_color;
 #endif
 
-#ifdef ALPHA_MASK
+#if defined(ALPHA_MASK) || defined(ALPHA_BLEND)
     float alpha = base_color.a;
 #ifdef HAS_TEXTURE
     // Mip-maps average a cut-out away, so its edge is that of the full picture.
@@ -60,10 +60,12 @@ void main() {
 #ifdef HAS_COLOR
     alpha *= vertex_color.a;
 #endif
+#endif
+#ifdef ALPHA_MASK
     if (alpha < alpha_cutoff) discard;
 #endif
 #ifdef ALPHA_BLEND
-    if (albedo.a <= bayer_threshold(uvec2(gl_FragCoord.xy))) discard;
+    if (alpha <= bayer_threshold(uvec2(gl_FragCoord.xy))) discard;
 #endif
 
     vec3 normal = gl_FrontFacing ? normal_depth.xyz : -normal_depth.xyz;

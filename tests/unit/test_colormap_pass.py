@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from impostor.lighting import DirectionalLight, Gloss, colormap
+from impostor.srgb import srgb_from_linear
 from impostor.views import basis_facing, direction, rotation_about_y
 from runtime.cameras import Camera
 from runtime.gl_state import preserved_state
@@ -65,13 +66,13 @@ def test_the_gpu_equals_numpy(ctx, colormaps, table, count, gloss):
 
 
 def test_one_albedo_folds_everything_into_the_first_half(ctx, colormaps, table):
-    """So that one texture is enough: albedo * diffuse + specular."""
+    """So that one texture is enough: albedo * diffuse + specular, on the sRGB curve."""
     lit_by, gloss, albedo = lights(3), Gloss(0.3, 10.0), (0.5, 0.25, 1.0)
     table.update(lit_by, AMBIENT)
     found = written(ctx, colormaps, table, rows_for(BASES, gloss, (*albedo, 1)))
     expected = colormap(BASES, lit_by, AMBIENT, gloss)
-    assert np.abs(found[:, :256, :3] - (expected.diffuse * albedo + expected.specular)).max() < 1e-5
-    assert not found[:, 256:, :3].any()
+    colors = srgb_from_linear(expected.diffuse * albedo + expected.specular)
+    assert np.abs(found[:, :256, :3] - colors).max() < 1e-5
     assert not found[:, 225:256].any()
 
 

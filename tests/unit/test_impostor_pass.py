@@ -366,12 +366,16 @@ class TestFullCache:
     YAWS = np.arange(64) * 0.01
 
     def pictures(self, ctx, fan, count, matrices, side):
+        """The picture, and the statistics of two equal draws."""
         renderer, picture = ImpostorRenderer(ctx, cache_side=side), Offscreen(ctx, 512, 512)
         try:
             renderer.add(fan, self.POSITIONS[:count], self.YAWS[:count])
-            picture.clear()
-            renderer.draw(*matrices)
-            return picture.color(), renderer.statistics
+            statistics = []
+            for _ in range(2):
+                picture.clear()
+                renderer.draw(*matrices)
+                statistics.append(renderer.statistics)
+            return picture.color(), *statistics
         finally:
             renderer.release()
             picture.release()
@@ -380,6 +384,7 @@ class TestFullCache:
         enough, plenty = (self.pictures(ctx, PAINTED, 64, filling(10.0), side) for side in (256, 2048))
         assert plenty[1]["coarser"] == 0 < enough[1]["coarser"]
         assert enough[1]["instances"] == enough[1]["tiles"] == enough[1]["relit"] == 64
+        assert enough[2] == {**enough[1], "relit": 0}
         assert apart(*(pictures[0] for pictures in (enough, plenty))).mean() < 12
         assert iou(enough[0][..., 3] > 128, plenty[0][..., 3] > 128) > 0.9
 
@@ -389,7 +394,8 @@ class TestFullCache:
         assert len(fan.normal) == 1
         enough, plenty = (self.pictures(ctx, fan, 64, filling(10.0), side) for side in (256, 2048))
         assert enough[1]["instances"] == 64
-        assert apart(enough[0], plenty[0]).max() <= 2
+        # A pixel whose coverage is just the cut-off may fall on either side of it.
+        assert (apart(enough[0], plenty[0]) > 2).sum() <= 2
 
     def test_the_cache_is_emptied_when_yaws_go_on_turning(self, ctx, renderer, draw):
         """Every frame needs a new tile; 400 of them do not fit in one page of 16."""

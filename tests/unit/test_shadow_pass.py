@@ -30,9 +30,9 @@ SOLIDS = (
     Box((0.5, 0.8, -0.25), (0.9, 1.8, 0.25)),
     Sphere((0.8, 0.4, 0.9), 0.4),
 )
-RING = {"views": 32, "elevation_deg": 15.0, "size": 128}
+RING = {"views": 16, "elevation_deg": 15.0, "size": 64}
 FAN = solid_fan(*SOLIDS, **RING)
-HIGH = {"views": 32, "elevation_deg": 60.0, "size": 128}
+HIGH = {"views": 16, "elevation_deg": 60.0, "size": 64}
 VIEWERS = {
     "orthographic": filling(2.4, 0.3, 0.5, (0.8, 0.5, -0.6)),
     "perspective": looking((2, 4, 6), (0.8, 0.4, -0.6), 40),
@@ -72,6 +72,12 @@ def light_at(azimuth_deg, elevation_deg, color=(1, 1, 1)):
     return DirectionalLight.from_angles(azimuth_deg, elevation_deg, color)
 
 
+def marked(renderer):
+    """Where the first light's shadow lies, before its edge is made smooth: (SIZE, SIZE) bool."""
+    pixels = np.frombuffer(renderer._shadows._marks.read(), np.uint8)
+    return pixels.reshape(SIZE, SIZE, 4)[::-1, :, 0] > 0
+
+
 def expected_mask(fan, place, matrices, light, plane):
     """The strips' triangles, projected by NumPy and filled pixel by pixel."""
     instances = Instances(fan, *place)
@@ -107,26 +113,29 @@ class TestShape:
         fan, light = solid_fan(*SOLIDS, **RING, **options), light_at(-50, 35)
         renderer.add(fan, *place)
         expected = expected_mask(fan, place, VIEWERS[viewer], light, plane)
-        found = shadowed(ground(VIEWERS[viewer], [light], plane))
-        assert expected.sum() > 500
-        # The edge is smoothed over a pixel; what is thinner than that is rounded away.
-        assert iou(found, expected) > (0.99 if expected.sum() > 4000 else 0.95)
-        assert not (found & ~binary_dilation(expected)).any()
-        assert not (binary_erosion(expected) & ~found).any()
+        pictures = ground(VIEWERS[viewer], [light], plane)
+        visible = pictures[1][..., 0] > 0  # up to the horizon
+        found, expected = marked(renderer) & visible, expected & visible
+        assert expected.sum() > 100
+        # What lies on a triangle's edge may fall on either side.
+        assert iou(found, expected) > (0.99 if expected.sum() > 2000 else 0.95)
+        assert not (shadowed(pictures) & ~binary_dilation(found)).any()
+        assert not (binary_erosion(found, np.ones((3, 3)), border_value=1) & ~shadowed(pictures)).any()
 
     @pytest.mark.parametrize("matrices", [filling(1.2, 0.1, 0.5, (0.5, 0, -0.2)), looking((1, 2, 4), (1, 0, -0.5), 30)])
     def test_a_picture_full_of_shadow(self, renderer, ground, matrices):
         place, light = ((0, 0, 0), 0.3, 1.0), light_at(-60, 30)
         renderer.add(FAN, *place)
-        found = shadowed(ground(matrices, [light]))
-        assert found.sum() > 2000
-        assert iou(found, expected_mask(FAN, place, matrices, light, LEVEL)) > 0.99
+        ground(matrices, [light])
+        expected = expected_mask(FAN, place, matrices, light, LEVEL)
+        assert expected.sum() > 1500
+        assert iou(marked(renderer), expected) > 0.99
 
-    @pytest.mark.parametrize("view", [0, 5, 20])
+    @pytest.mark.parametrize("view", [0, 3, 10])
     def test_it_is_the_meshs_shadow_when_the_light_is_a_views_own(self, renderer, ground, view):
         """Seen from a fan camera, too; a strip's outline lies half a texel inside."""
-        azimuth = view * 360 / 32
-        matrices = filling(3.0, np.radians(azimuth + 56.25), np.radians(15), (0, 0.3, 0))
+        azimuth = view * 360 / 16
+        matrices = filling(3.0, np.radians(azimuth + 67.5), np.radians(15), (0, 0.3, 0))
         light = light_at(azimuth, 15)
         fan = renderer.add(FAN)
         strip = shadowed(ground(matrices, [light]))
@@ -154,13 +163,30 @@ class TestShape:
     @pytest.mark.parametrize("sink", [0.4, 0.8])
     def test_what_is_buried_casts_no_shadow(self, renderer, ground, sink):
         """A post in the ground shades as far as what stands out of it."""
-        fan = solid_fan(Box((-0.2, 0, -0.2), (0.2, 1, 0.2)), views=32, elevation_deg=30, size=64)
+        fan = solid_fan(Box((-0.2, 0, -0.2), (0.2, 1, 0.2)), views=16, elevation_deg=30, size=64)
         renderer.add(fan, (0, -sink, 0))
         found = shadowed(ground(filling(2.0, 0.0, np.radians(30)), [light_at(90, 30)]))
         _, columns = np.nonzero(found)
         left, right = (np.array([columns.min(), columns.max() + 1]) / SIZE * 4 - 2).tolist()
         assert left == pytest.approx(-0.2 - (1 - sink) / np.tan(np.radians(30)), abs=0.08)
         assert right == pytest.approx(0.2, abs=0.08)
+
+    def test_far_from_the_origin(self, renderer, ground):
+        fan, light = renderer.add(FAN), light_at(-50, 35)
+        ground(VIEWERS["orthographic"], [light])
+        expected = marked(renderer)
+        renderer.remove(fan)
+        renderer.add(FAN, (1000, 0, -1000))
+        ground(filling(2.4, 0.3, 0.5, (1000.8, 0.5, -1000.6)), [light])
+        assert iou(marked(renderer), expected) > 0.97
+
+    @pytest.mark.parametrize("view", [0, 0.5])
+    def test_a_solid_has_a_shadow_without_cracks(self, renderer, ground, view):
+        renderer.add(solid_fan(Sphere((0, 1, 0)), **RING))
+        light = light_at(view * 22.5, 40)
+        for azimuth in (1.0, 2.0, 4.0):
+            ground(filling(3.0, azimuth, 0.5), [light])
+            assert label(~marked(renderer))[1] == 1
 
     def test_shadows_reach_past_the_picture_in_a_grazing_light(self, renderer, ground):
         """Thirty metres of shadow, and no triangle wraps around the eye."""
@@ -177,9 +203,9 @@ class TestLight:
     @pytest.mark.parametrize("albedo", [0.3, 1.0])
     def test_the_shadow_is_the_ground_without_that_light(self, renderer, screen, ground, ambient, albedo):
         light, surface = light_at(-50, 35, (0.5, 0.5, 0.5)), GroundSurface(albedo=(albedo,) * 3, reach=1e4)
-        renderer.add(FAN)
+        renderer.add(solid_fan(Sphere((0, 1, 0)), **RING))
         pictures = ground(self.MATRICES, [light], LEVEL, ambient, surface)
-        inside = binary_erosion(shadowed(ground(self.MATRICES, [light])), iterations=2)
+        inside = binary_erosion(shadowed(ground(self.MATRICES, [light])), np.ones((5, 5)))
         assert inside.sum() > 100
         expected = srgb_from_linear(albedo * ambient) * 255
         assert np.abs(pictures[0][inside][:, :3] - expected).max() < 8
@@ -273,7 +299,7 @@ class TestInTheScene:
         """A post seen from between two fan cameras and above them: post and shadow are in one piece."""
         post = solid_fan(Box((-0.12, 0, -0.12), (0.12, 1.2, 0.12), GREEN), **RING)
         renderer.add(post)
-        azimuth, elevation = turn * 2 * np.pi / 32, np.radians(15 + rise_deg)
+        azimuth, elevation = turn * 2 * np.pi / 16, np.radians(15 + rise_deg)
         for matrices in (
             filling(1.6, azimuth, elevation, (0, 0.4, 0)),
             looking(9 * direction(azimuth, elevation), (0, 0.4, 0), 20),

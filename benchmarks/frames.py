@@ -1,0 +1,130 @@
+"""Tables "frames" and "fill": objects as impostors against the same objects as meshes, and as plain textured quads."""
+
+from __future__ import annotations
+
+import math
+
+from benchmarks.plain_quads import BILINEAR, TRILINEAR, PlainQuads
+from benchmarks.scenes import HEIGHT, HEIGHTS, WIDTH, Field, MeshField
+from benchmarks.tables import Bar, Row, Table
+from benchmarks.timing import Times, alternate
+from benchmarks.workbench import Workbench, say
+
+LONGEST_FRAME = 60.0  # seconds; of a longer one a part is drawn and the rest estimated
+SPEED_UPS = {1: 10.0, 100: 200.0}
+SCENE = f"{WIDTH} x {HEIGHT} pixels; `objects` copies over the whole picture, each turned another way"
+
+
+def run_frames(bench: Workbench) -> Table:
+    """Frame times by number of objects."""
+    subject = bench.subject("dragon")
+    columns = {
+        "objects": "objects",
+        "pixels_high": "pixels high",
+        "mesh_ms": "mesh, ms",
+        "impostor_ms": "impostor, ms",
+        "impostor_shadow_ms": "impostor + shadow, ms",
+        "plain_ms": "plain quads, ms",
+        "speed_up": "mesh / (impostor + shadow)",
+    }
+    table = Table("frames", f"Frame time: {subject.label} as mesh and as impostor", columns)
+    for count, pixels_high in HEIGHTS.items():
+        say(f"frames: {count} objects")
+        field = Field(bench.ctx, bench.fan("dragon"), count, pixels_high)
+        field.impostors_and_shadows()
+        plain = PlainQuads(field)
+        plain.prepare(BILINEAR)
+        jobs = (field.impostors_and_shadows, field.impostors, lambda plain=plain: plain.draw(BILINEAR))
+        times = alternate(*jobs, ctx=bench.ctx)
+        mesh, note = mesh_seconds(bench, field)
+        values = {
+            "objects": count,
+            "pixels_high": pixels_high,
+            "mesh_ms": mesh * 1e3,
+            "impostor_ms": times.median(1) * 1e3,
+            "impostor_shadow_ms": times.median(0) * 1e3,
+            "plain_ms": times.median(2) * 1e3,
+            "speed_up": mesh / times.median(0),
+        }
+        bars = (Bar("speed_up", ">=", SPEED_UPS[count]),) if count in SPEED_UPS and subject.real else ()
+        table.rows.append(Row(str(count), f"{count} x {pixels_high} px", values, bars, note))
+        plain.release()
+        field.release()
+    table.notes.append(
+        f"{SCENE}. The mesh has {bench.model('dragon').triangle_count:,} triangles, one draw call a copy, and casts no "
+        "shadow. Every frame clears colour and depth. Lights and viewer stand still."
+    )
+    return table
+
+
+def mesh_seconds(bench: Workbench, field: Field) -> tuple[float, str]:
+    """Seconds of a frame of meshes, and how it was found where it was not drawn whole."""
+    meshes = MeshField(field, bench.model("dragon"))
+    try:
+        one = alternate(lambda: meshes.meshes(1), ctx=bench.ctx, repeats=3).median(0)
+        whole = one * field.count
+        drawn = field.count if whole <= LONGEST_FRAME else max(math.floor(LONGEST_FRAME / 6 / one), 1)
+        repeats = 7 if whole < 1 else 1
+        seconds = alternate(lambda: meshes.meshes(drawn), ctx=bench.ctx, repeats=repeats, warm_up=1).median(0)
+    finally:
+        meshes.release()
+    if drawn == field.count:
+        return seconds, ""
+    return seconds * field.count / drawn, f"mesh: {drawn} of {field.count} drawn, time multiplied up"
+
+
+def run_fill(bench: Workbench) -> Table:
+    """The impostor pass against the same quads with one texture fetch."""
+    subject = bench.subject("dragon")
+    columns = {
+        "objects": "objects",
+        "plain_ms": "plain, bilinear, ms",
+        "plain_trilinear_ms": "plain, trilinear, ms",
+        "still_ms": "impostors, all still, ms",
+        "still_ratio": "still / plain",
+        "still_trilinear_ratio": "still / trilinear",
+        "moving_ms": "viewer moves, ms",
+        "relit_ms": "lights change, ms",
+        "relit_ratio": "lights change / plain",
+        "clear_ms": "clear alone, ms",
+    }
+    table = Table("fill", "The impostor pass against plain textured quads", columns)
+    for count, pixels_high in HEIGHTS.items():
+        say(f"fill: {count} objects")
+        field = Field(bench.ctx, bench.fan("dragon"), count, pixels_high)
+        field.impostors()
+        plain = PlainQuads(field)
+        still, trilinear = (against_plain(field, plain, fetch) for fetch in (BILINEAR, TRILINEAR))
+        # Apart, because it would undo what the still frames keep.
+        moving = alternate(field.impostors_moving, ctx=bench.ctx)
+        values = {
+            "objects": count,
+            "plain_ms": still.median(1) * 1e3,
+            "plain_trilinear_ms": trilinear.median(1) * 1e3,
+            "still_ms": still.median(2) * 1e3,
+            "still_ratio": still.ratio(2, 1),
+            "still_trilinear_ratio": trilinear.ratio(2, 1),
+            "moving_ms": moving.median(0) * 1e3,
+            "relit_ms": still.median(3) * 1e3,
+            "relit_ratio": still.ratio(3, 1),
+            "clear_ms": still.median(0) * 1e3,
+        }
+        bars = (Bar("still_ratio", "<=", 1.5), Bar("relit_ratio", "<=", 4.0))
+        table.rows.append(Row(str(count), f"{count} x {pixels_high} px", values, bars if subject.real else ()))
+        plain.release()
+        field.release()
+    table.notes.append(
+        f"{SCENE}. The plain quads are the impostor pass's own rectangles in its own order, drawn in one bare call "
+        "from an RGBA8 copy of its tiles with one fetch, the same alpha cut-off, blending and depth test, at the quad's "
+        "own depth. Where all stands still the pass keeps the quads of the last frame; where the viewer moves it finds "
+        "them anew; where lights change it relights every tile in every frame. All frames clear colour and depth, and "
+        "the impostors' read and restore the caller's OpenGL state."
+    )
+    return table
+
+
+def against_plain(field: Field, plain: PlainQuads, fetch: str) -> Times:
+    """Seconds of frames: clear, plain, still, relit."""
+    plain.prepare(fetch)
+    jobs = (field.empty, lambda: plain.draw(fetch), field.impostors, field.impostors_relit)
+    return alternate(*jobs, ctx=field.ctx)

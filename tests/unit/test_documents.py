@@ -1,0 +1,54 @@
+"""What the documents say is so: links lead somewhere, tests they name exist, numbers are the benchmark's."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.data import ROOT
+
+DOCUMENTS = ["README.md", "CONVENTIONS.md", "CHANGELOG.md", "docs/method.md", "docs/embedding.md"]
+PACKAGES = ("impostor", "bake", "runtime")
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_links_lead_somewhere(name):
+    text = (ROOT / name).read_text()
+    targets = [target for target in re.findall(r"\]\(([^)#\s]+)\)", text) if "://" not in target]
+    missing = [target for target in targets if not ((ROOT / name).parent / target).exists()]
+    assert not missing
+
+
+def test_every_convention_has_its_test():
+    named = re.findall(r"`(tests/[\w/]+\.py)(?:::(\w+))?`", (ROOT / "CONVENTIONS.md").read_text())
+    assert len(named) > 15
+    for file, test in named:
+        source = (ROOT / file).read_text()
+        assert not test or f"def {test}(" in source, f"{file}::{test}"
+
+
+def test_one_word_per_thing():
+    words = re.compile(r"\b(sprites?|billboards?)\b", re.IGNORECASE)
+    files = [path for package in PACKAGES for path in (ROOT / package).rglob("*") if path.suffix in (".py", ".md")]
+    used = [str(path) for path in files if words.search(path.read_text())]
+    assert not used
+
+
+def test_the_two_commands_of_the_readme_are_targets():
+    makefile = (ROOT / "Makefile").read_text()
+    for command in re.findall(r"^ {4}make (\w+)", (ROOT / "README.md").read_text(), re.MULTILINE):
+        assert re.search(rf"^{command}:", makefile, re.MULTILINE), command
+
+
+def test_set_up_a_second_time_does_nothing():
+    done = subprocess.run(["tools/setup.sh"], cwd=ROOT, capture_output=True, text=True, timeout=3, check=True)
+    assert done.stdout + done.stderr == ""
+
+
+def test_nothing_names_an_address_or_a_machine():
+    """Pinned names and versions only: no registry, no path of one machine."""
+    places = re.compile(r"https?://(?!www\.w3|json-schema|creativecommons)|/root/|/home/\w")
+    kinds = ("*.toml", "*.txt", "Makefile", "*.sh")
+    files = [path for kind in kinds for path in Path(ROOT).glob(kind)] + list((ROOT / "tools").iterdir())
+    assert not [str(path) for path in files if places.search(path.read_text())]
