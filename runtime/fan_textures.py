@@ -34,14 +34,18 @@ class FanTextures:
 
     def __init__(self, ctx: moderngl.Context, fan: Fan):
         self.fan = fan
-        self.size, self.levels = fan.size, len(fan.normal)
+        self.size = fan.size
+        # OpenGL rounds a level's size down, which tears tiles apart whose size is odd.
+        self.levels = 1
+        while self.levels < len(fan.normal) and fan.size % (1 << self.levels) == 0:
+            self.levels += 1
         self.columns, rows = atlas_grid(len(fan.views))
         width, height = self.columns * fan.size, rows * fan.size
         check_texture_size(ctx, fan.name, width, height)
         coverage = fan.color[..., 3]
         self.normal = ctx.texture((width, height), 2)
         self.normal.build_mipmaps(max_level=max(self.levels - 1, 1))
-        for level, codes in enumerate(fan.normal):
+        for level, codes in enumerate(fan.normal[: self.levels]):
             self.normal.write(tiles_to_atlas(np.stack([codes, coverage], axis=-1)).tobytes(), level=level)
             coverage = _halved(coverage)
         self.normal.filter = (moderngl.NEAREST_MIPMAP_NEAREST, moderngl.NEAREST)

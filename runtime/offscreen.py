@@ -57,6 +57,13 @@ class Offscreen:
         self.framebuffer.use()
         self.framebuffer.clear(*background, depth=1.0)
 
+    def clear_depth(self) -> None:
+        """Bind the framebuffer and let what is drawn next cover all that is there."""
+        self.framebuffer.use()
+        self.framebuffer.color_mask = (False,) * 4
+        self.framebuffer.clear(depth=1.0)
+        self.framebuffer.color_mask = (True,) * 4
+
     def color(self) -> NDArray[np.uint8]:
         """The picture, (height, width, 4) uint8, sRGB and premultiplied alpha, row 0 at the top."""
         if self._level:

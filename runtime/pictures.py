@@ -23,7 +23,6 @@ OUTPUTS = ("lit", "albedo", "normal", "depth", "alpha")
 MESH_SAMPLES = 4
 GROUND_ALBEDO = (0.55, 0.54, 0.5)
 GROUND_REACH = 12  # bounding radii
-GROUND_GAP = 1e-3  # bounding radii: what lies flat on the ground must not fight with it for the pixels
 
 
 @dataclass(frozen=True)
@@ -110,6 +109,8 @@ def draw_picture(
         target.clear(settings.background if lit else (0.0, 0.0, 0.0, 0.0))
         if lit and settings.shadow:
             _draw_ground(renderer, subject, camera, settings)
+            # Nothing of the object is under the ground: neither its feet nor what lies flat may fight with it.
+            target.clear_depth()
         shown = settings.output if settings.output in ("albedo", "normal") else "lit"
         renderer.draw_meshes(*camera.matrices, shown)
         renderer.draw(*camera.matrices, shown)
@@ -123,9 +124,8 @@ def draw_picture(
 
 def _draw_ground(renderer: ImpostorRenderer, subject: Fan | Model, camera: Camera, settings: PictureSettings) -> None:
     low, high = subject.bounds
-    level = float(low[1]) - GROUND_GAP * subject.radius
-    middle = (float((low[0] + high[0]) / 2), level, float((low[2] + high[2]) / 2))
-    ground = Ground(np.array([0.0, 1.0, 0.0]), level)
+    middle = (float((low[0] + high[0]) / 2), float(low[1]), float((low[2] + high[2]) / 2))
+    ground = Ground(np.array([0.0, 1.0, 0.0]), low[1])
     if camera.toward_eye(np.array(middle))[1] <= 0:
         return
     reach = GROUND_REACH * subject.radius

@@ -161,6 +161,20 @@ def test_a_texture_keeps_its_top_left():
     assert color[50, 50, :3].tolist() == [255, 255, 255]
 
 
+def test_two_textures_stay_on_their_own_surfaces():
+    def painted(color):
+        return Material(base_color=(1, 1, 1, 1), texture=np.full((8, 8, 4), (*color, 255), np.uint8))
+
+    left, right = (
+        quad(-1, -1, 0, 1, material=painted((200, 30, 30))),
+        quad(0, -1, 1, 1, material=painted((30, 30, 200))),
+    )
+    for order in ([left, right], [right, left]):
+        color = layers(order).color
+        assert color[32, 16, :3].tolist() == [200, 30, 30]
+        assert color[32, 48, :3].tolist() == [30, 30, 200]
+
+
 def test_every_srgb_byte_of_a_texture_comes_back_within_one():
     pixels = np.full((16, 16, 4), 255, np.uint8)
     pixels[..., 0] = np.arange(256).reshape(16, 16)

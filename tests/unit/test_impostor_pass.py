@@ -344,6 +344,12 @@ class TestSizes:
         assert pixels[32, 32].tolist() == [255, 0, 0, 255]
         assert 0.25 < (pixels[..., 3] > 128).mean() < 0.45
 
+    def test_tiles_of_an_odd_size(self, renderer, draw):
+        """Half of 9 texels is 4, but half of two tiles of 9 is 9: such levels are left out."""
+        card = card_fan(corner_card(9), levels=3)
+        renderer.add(card)
+        assert draw(filling(3.0))[26, 26].tolist() == [255, 0, 0, 255]
+
     def test_a_camera_in_the_middle_of_a_copy(self, renderer, draw):
         renderer.add(FAN)
         draw(looking((0, 0, 1e-6), (0, 0, -1)))

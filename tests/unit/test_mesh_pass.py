@@ -1,0 +1,169 @@
+"""Polygon meshes: what a fan is compared with, so each colour is worked out here by hand."""
+
+import numpy as np
+import pytest
+
+from impostor.lighting import DirectionalLight, Gloss
+from impostor.model import Material, Model
+from impostor.srgb import srgb_from_linear
+from impostor.views import direction
+from tests.pictures import filling, looking, placed
+from tests.solids import BLUE, GREEN, RED, WHITE, Box, Sphere, corner_card, solid_model
+
+CORNERS = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
+FACES = np.array([[0, 1, 2], [0, 2, 3]])
+UVS = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], float)  # v runs down
+
+
+def card(normals=(0, 0, 1), faces=FACES, **material):
+    """A square that fills `filling()`'s picture, facing +Z."""
+    textured = material.get("texture") is not None
+    return Model.from_arrays(
+        CORNERS, faces, np.tile(normals, (4, 1)).astype(float),
+        uvs=UVS if textured else None, material=Material(**{"base_color": (1.0, 1.0, 1.0, 1.0), **material}),
+    )  # fmt: skip
+
+
+@pytest.fixture
+def draw(renderer, screen):
+    def drawn(*models, output="lit", matrices=None):
+        meshes = [renderer.add_mesh(model) for model in models]
+        screen.clear()
+        renderer.draw_meshes(*(matrices or filling()), output=output)
+        for mesh in meshes:
+            renderer.remove(mesh)
+        return screen.color()
+
+    return drawn
+
+
+def test_light_times_albedo_on_the_srgb_curve(renderer, draw):
+    renderer.lights = [DirectionalLight.from_angles(0, 60, (0.8, 0.4, 0.0)), DirectionalLight.from_angles(180, 0)]
+    renderer.ambient = (0.1, 0.0, 0.3)
+    expected = np.array([0.5, 0.25, 1.0]) * (np.array([0.1, 0, 0.3]) + 0.5 * np.array([0.8, 0.4, 0]))
+    pixels = draw(card(base_color=(0.5, 0.25, 1.0, 1.0)))
+    np.testing.assert_allclose(pixels[32, 32, :3], srgb_from_linear(expected) * 255, atol=1)
+    assert (pixels == pixels[0, 0]).all()
+
+
+def test_light_uses_the_smooth_normal(renderer, draw):
+    renderer.lights, renderer.ambient = [DirectionalLight((1, 0, 1))], 0
+    pixels = draw(card(normals=(0.6, 0, 0.8)))
+    np.testing.assert_allclose(pixels[5, 5, 0], srgb_from_linear(1.4 / np.sqrt(2)) * 255, atol=1)
+
+
+@pytest.mark.parametrize("orthographic", [True, False])
+def test_the_highlight_is_where_half_way_meets_the_normal(renderer, draw, orthographic):
+    """Blinn-Phong at every pixel of a card, from the position of the eye."""
+    light, gloss, eye = direction(0.6, 0.3), Gloss(0.8, 40.0), np.array([0, 0, 3.0])
+    renderer.lights, renderer.ambient = [DirectionalLight(tuple(light))], 0
+    matrices = filling() if orthographic else looking(eye, fov_deg=2 * np.degrees(np.arctan(1 / 3)))
+    renderer.add_mesh(card(base_color=(0, 0, 0, 1)), gloss=gloss)
+    pixels = draw(matrices=matrices)
+    across = (np.arange(64) + 0.5) / 32 - 1
+    x, y = np.meshgrid(across, -across)
+    toward = np.stack([0 * x, 0 * x, 0 * x + 1] if orthographic else [-x, -y, 0 * x + 3], axis=-1)
+    half = light + toward / np.linalg.norm(toward, axis=-1, keepdims=True)
+    half /= np.linalg.norm(half, axis=-1, keepdims=True)
+    expected = srgb_from_linear(0.8 * half[..., 2] ** 40) * 255
+    assert expected.max() > 50
+    assert np.abs(pixels[..., 0] - expected).max() < 2
+
+
+def test_a_texture_is_upright_and_not_mirrored(draw):
+    pixels = draw(card(texture=corner_card(64)), output="albedo")
+    for row, column, color in ((2, 2, RED), (2, 61, GREEN), (61, 2, BLUE), (61, 61, WHITE)):
+        assert pixels[row, column].tolist() == [*color, 255]
+
+
+def test_texture_factor_and_vertex_colour_multiply_in_linear_light(draw):
+    texture = np.full((4, 4, 4), (188, 188, 188, 255), np.uint8)
+    model = Model.from_arrays(
+        CORNERS, FACES, np.tile((0.0, 0, 1), (4, 1)), np.full((4, 4), (255, 188, 0, 255), np.uint8), UVS,
+        Material(base_color=(0.5, 1, 1, 1), texture=texture),
+    )  # fmt: skip
+    half = float(((188 / 255 + 0.055) / 1.055) ** 2.4)
+    expected = srgb_from_linear(np.array([half * 0.5, half * half, 0])) * 255
+    np.testing.assert_allclose(draw(model, output="albedo")[20, 20, :3], expected, atol=1)
+
+
+def test_a_fine_texture_far_away_is_its_mean_light(draw):
+    texture = np.full((256, 256, 4), 255, np.uint8)
+    texture[(np.indices((256, 256)).sum(axis=0) % 2) == 0, :3] = 0
+    pixels = draw(card(texture=texture), output="albedo")[..., 0].astype(int)
+    assert np.abs(pixels - 188).max() < 4
+
+
+def test_a_mask_cuts_at_its_threshold(draw):
+    texture = np.full((64, 64, 4), 255, np.uint8)
+    texture[..., 3] = np.arange(64) * 4
+    pixels = draw(card(texture=texture, alpha_mode="MASK", alpha_cutoff=0.25), output="albedo")
+    assert not pixels[:, :14].any()
+    assert (pixels[:, 18:] == 255).all()
+
+
+@pytest.mark.parametrize("alpha", [0.0, 0.25, 0.5, 1.0])
+def test_blending_covers_its_share_of_the_pixels(draw, alpha):
+    pixels = draw(card(base_color=(1, 1, 1, alpha), alpha_mode="BLEND"), output="albedo")
+    assert (pixels[..., 3] == 255).mean() == pytest.approx(alpha, abs=1 / 32)
+
+
+def test_alpha_of_what_is_opaque_does_not_count(draw):
+    assert (draw(card(base_color=(1, 1, 1, 0.1)), output="albedo") == 255).all()
+
+
+@pytest.mark.parametrize("double_sided", [True, False])
+def test_the_back_of_a_surface(renderer, draw, double_sided):
+    """Lit like a front when the material has two sides, else not there."""
+    renderer.lights, renderer.ambient = [DirectionalLight((0, 0, -1))], 0
+    pixels = draw(card(double_sided=double_sided), matrices=filling(azimuth=np.pi))
+    assert (pixels == (255 if double_sided else 0)).all()
+
+
+def test_normals_are_the_viewers(draw):
+    side = draw(card(), output="normal", matrices=filling(azimuth=0.5))[32, 32]
+    expected = (np.array([np.sin(-0.5), 0, np.cos(0.5)]) / 2 + 0.5) * 255
+    np.testing.assert_allclose(side[:3], expected, atol=1)
+
+
+def test_the_nearest_surface_is_seen(draw):
+    far, near = Box((-1, -1, -1), (1, 1, -0.5), RED), Box((-0.5, -0.5, 0), (0.5, 0.5, 0.5), BLUE)
+    for models in ((far, near), (near, far)):
+        pixels = draw(*(solid_model(each) for each in models), output="albedo")
+        assert pixels[32, 32].tolist() == [*BLUE, 255]
+        assert pixels[5, 5].tolist() == [*RED, 255]
+
+
+def test_a_mesh_may_be_moved_in_place(renderer, screen):
+    model = solid_model(Box((-0.25, -0.25, 0), (0.25, 0.25, 0.1), RED))
+    meshes = [renderer.add_mesh(model), renderer.add_mesh(model, placed((0.5, 0.5, 0), scale=0.5))]
+    assert meshes[0].buffers is meshes[1].buffers
+    meshes[0].world_from_model[:3, 3] = -0.5, -0.5, 0
+    screen.clear()
+    renderer.draw_meshes(*filling(), output="albedo")
+    red = screen.color()[..., 0] == 255
+    assert red[48, 16]
+    assert red[16, 48]
+    assert not red[32, 32]
+    assert red.sum() == 16 * 16 + 8 * 8
+
+
+def test_turning_a_mesh_turns_its_light(renderer, draw, screen):
+    """The lit side stays on the light's side."""
+    renderer.lights, renderer.ambient = [DirectionalLight((1, 0, 0))], 0
+    model = solid_model(Sphere())
+    pictures = []
+    for yaw in (0.0, 1.0, 2.5):
+        mesh = renderer.add_mesh(model, placed(yaw=yaw, scale=0.8))
+        screen.clear()
+        renderer.draw_meshes(*filling())
+        pictures.append(screen.color())
+        renderer.remove(mesh)
+    assert pictures[0][32, 50, 0] > 150 > 20 > pictures[0][32, 14, 0]
+    for picture in pictures[1:]:
+        # The facets turn, the light does not.
+        assert np.abs(picture[16:48, 16:48].astype(int) - pictures[0][16:48, 16:48]).max() < 6
+
+
+def test_no_meshes_draw_nothing(draw):
+    assert not draw().any()
