@@ -47,6 +47,8 @@ _ARRAY_BUFFER, _ARRAY_BUFFER_BINDING, _UNPACK_BUFFER, _UNPACK_BUFFER_BINDING = 0
 # How uploads read memory: row length, skipped rows and pixels, swapped bytes; the alignments follow each upload.
 _PIXEL_STORE = {0x0CF2: 0, 0x0CF3: 0, 0x0CF4: 0, 0x0CF0: 0, 0x0CF5: 4, 0x0D05: 4}
 
+_FOUR_INTEGERS = ctypes.c_int * 4
+
 
 @cache
 def _library() -> Any:
@@ -76,27 +78,29 @@ def _function(name: str) -> Any:
         return ctypes.WINFUNCTYPE(None)(address)  # type: ignore[attr-defined]
 
 
-def _call(name: str, *arguments: int | float) -> None:
-    converted = [ctypes.c_float(a) if isinstance(a, float) else ctypes.c_int(a) for a in arguments]
-    _function(name)(*converted)
+def _call(name: str, *arguments: int) -> None:
+    _function(name)(*arguments)
 
 
 def _integers(name: int, count: int = 1) -> list[int]:
-    values = (ctypes.c_int * max(count, 4))()
-    _function("glGetIntegerv")(ctypes.c_uint(name), values)
-    return list(values[:count])
+    values = _FOUR_INTEGERS()
+    _function("glGetIntegerv")(name, values)
+    return values[:count]
 
 
 def _float(name: int) -> float:
     value = (ctypes.c_float * 4)()
-    _function("glGetFloatv")(ctypes.c_uint(name), value)
+    _function("glGetFloatv")(name, value)
     return value[0]
 
 
 def _enabled(switch: int) -> bool:
-    function = _function("glIsEnabled")
-    function.restype = ctypes.c_ubyte
-    return bool(function(ctypes.c_uint(switch)))
+    # A GLboolean is one byte; what ctypes takes for an int holds more.
+    return bool(_function("glIsEnabled")(switch) & 0xFF)
+
+
+def _polygon_offset(factor: float, units: float) -> None:
+    _function("glPolygonOffset")(ctypes.c_float(factor), ctypes.c_float(units))
 
 
 def _switch(name: int, on: bool) -> None:
@@ -162,7 +166,7 @@ class CallerState:
         _call("glBlendEquationSeparate", *self._blend_equation)
         _call("glCullFace", self._cull_mode)
         _call("glFrontFace", self._front_face)
-        _call("glPolygonOffset", *self._polygon_offset)
+        _polygon_offset(*self._polygon_offset)
         _call("glPolygonMode", _FRONT_AND_BACK, self._polygon_mode)
         for unit, (texture, sampler) in self._textures.items():
             _call("glActiveTexture", _TEXTURE0 + unit)
@@ -205,7 +209,7 @@ def set_state(
         _call("glCullFace", 0x0405)
     _switch(_POLYGON_OFFSET_FILL, polygon_offset is not None)
     if polygon_offset is not None:
-        _call("glPolygonOffset", float(polygon_offset[0]), float(polygon_offset[1]))
+        _polygon_offset(*polygon_offset)
     if color_mask is not None:
         _call("glColorMask", *(int(on) for on in color_mask))
 

@@ -59,10 +59,10 @@ class Offscreen:
 
     def clear_depth(self) -> None:
         """Bind the framebuffer and let what is drawn next cover all that is there."""
-        self.framebuffer.use()
-        self.framebuffer.color_mask = (False,) * 4
+        self.framebuffer.color_mask = (False, False, False, False)
         self.framebuffer.clear(depth=1.0)
-        self.framebuffer.color_mask = (True,) * 4
+        self.framebuffer.color_mask = (True, True, True, True)
+        self.framebuffer.use()
 
     def color(self) -> NDArray[np.uint8]:
         """The picture, (height, width, 4) uint8, sRGB and premultiplied alpha, row 0 at the top."""

@@ -286,9 +286,9 @@ def _ground_rectangle(
     for light in lights:
         slope = np.array(light.toward) / (ground.normal @ light.toward)
         height = centers @ ground.normal - ground.offset
-        # A sphere's shadow is longer than it is wide by the light's slope.
-        reach = radii * (np.linalg.norm(slope) + 1)
-        square = (centers - height[:, None] * slope)[:, None] + reach[:, None, None] * (SQUARE @ axes)
+        # A sphere's shadow is an ellipse, longer the more the light slopes along an axis.
+        reach = radii[:, None] * np.sqrt(1 + (axes @ slope) ** 2)
+        square = (centers - height[:, None] * slope)[:, None] + (SQUARE * reach[:, None]) @ axes
         # Where the viewer is shown it: steps 3 to 5 move what the true shadow covers.
         shown = np.einsum("nij,nkj->nki", moved[..., :3], square) + moved[:, None, :, 3]
         weight = shown[..., 3]
