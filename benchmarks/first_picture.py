@@ -19,6 +19,8 @@ def main(fan_path: str, png_path: str) -> None:
         now = time.perf_counter()
         steps[step], last = now - last, now
 
+    import numpy as np
+
     from impostor import Ground, load
     from runtime import ImpostorRenderer
     from runtime.cameras import Camera
@@ -39,7 +41,7 @@ def main(fan_path: str, png_path: str) -> None:
     camera = Camera.perspective(middle + [0, radius, 5 * radius], middle, 30, 1280 / 720, radius / 10, 20 * radius)
     matrices = camera.clip_from_view, camera.view_from_world
     picture.clear((0.4, 0.5, 0.6, 1.0))
-    renderer.draw_shadows(*matrices, Ground((0, 1, 0), float(middle[1] - radius)))
+    renderer.draw_shadows(*matrices, Ground(np.array([0.0, 1.0, 0.0]), float(middle[1] - radius)))
     renderer.draw(*matrices)
     pixels = picture.color()
     done("draw")

@@ -115,8 +115,8 @@ def run_fill(bench: Workbench) -> Table:
         field.release()
     table.notes.append(
         f"{SCENE}. The plain quads are the impostor pass's own rectangles in its own order, drawn in one bare call "
-        "from an RGBA8 copy of its tiles with one fetch, the same alpha cut-off, blending and depth test, at the quad's "
-        "own depth. Where all stands still the pass keeps the quads of the last frame; where the viewer moves it finds "
+        "from an RGBA8 copy of its tiles with one fetch, the same alpha cut-off, blending and depth test, at the "
+        "quad's own depth. Where all stands still the pass keeps the quads of the last frame; where the viewer moves it finds "
         "them anew; where lights change it relights every tile in every frame. All frames clear colour and depth, and "
         "the impostors' read and restore the caller's OpenGL state."
     )

@@ -41,7 +41,7 @@ def run_lights(bench: Workbench) -> Table:
             "relit_ms": relit.median(index) * 1e3,
         }
         bars = (Bar("still_ratio", "<", 1.05),) if count == 100 else ()
-        table.rows.append(Row(str(count), f"{count} lights", values, bars))
+        table.rows.append(Row(str(count), _many(count, "light"), values, bars))
     for field in fields:
         field.release()
     table.notes.append(
@@ -70,7 +70,13 @@ def run_colormap(bench: Workbench) -> Table:
                 "gpu_ms": gpu.median(0) * 1e3,
                 "numpy_ms": numpy.median(0) * 1e3,
             }
-            table.rows.append(Row(f"{light_count}x{row_count}", f"{light_count} lights, {row_count} rows", values))
+            table.rows.append(
+                Row(f"{light_count}x{row_count}", f"{_many(light_count, 'light')}, {_many(row_count, 'row')}", values)
+            )
     light_table.release()
     colormaps.release()
     return table
+
+
+def _many(count: int, word: str) -> str:
+    return f"{count:,} {word}{'s' * (count != 1)}"

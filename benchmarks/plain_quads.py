@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import moderngl
-import numpy as np
 
 from benchmarks.scenes import BACKGROUND, Field
+from runtime.gpu import set_uniforms
 from runtime.impostors import ALPHA_CUTOFF, QUAD_DTYPE
 from runtime.relight import CORNERS
 
@@ -62,9 +62,8 @@ class PlainQuads:
 
     def _array(self, fetch: str) -> moderngl.VertexArray:
         program = self._ctx.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT.replace("FETCH", fetch))
-        program["clip_from_world"].write(np.ascontiguousarray(self._field.viewer.clip_from_world.T, "f4"))
-        program["texture_size"] = self._texture.size
-        program["alpha_cutoff"] = ALPHA_CUTOFF
+        clip_from_world, size = self._field.viewer.clip_from_world, self._texture.size
+        set_uniforms(program, clip_from_world=clip_from_world, texture_size=size, alpha_cutoff=ALPHA_CUTOFF)
         layout = "3f 3f 3f 12x 4f 3f 16x/i"
         names = ("center", "right", "up", "rectangle", "place")
         return self._ctx.vertex_array(program, [(self._corners, "2f", "corner"), (self._records, layout, *names)])
@@ -81,7 +80,7 @@ class PlainQuads:
         """A frame of plain quads: one draw call, blended, depth tested and written by the rasteriser."""
         self._field.target.clear(BACKGROUND)
         self._ctx.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
-        self._ctx.depth_func = "<="
+        self._ctx.depth_func = "<"
         self._ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         self._texture.use(0)
         self._arrays[fetch].render(moderngl.TRIANGLE_STRIP, instances=self._count)

@@ -76,7 +76,9 @@ def place(fan: Fan, count: int, pixels_high: int, seed: int = 1) -> Placement:
     # Where each line of sight meets the plane through the objects' middles.
     positions = eye + rays * ((middle[1] - eye[1]) / rays[:, 1])[:, None] - middle
     lowest = float(middle[1] - metres_high / 2)
-    return Placement(positions, generator.uniform(0, 2 * np.pi, count), Ground((0.0, 1.0, 0.0), lowest), camera)
+    return Placement(
+        positions, generator.uniform(0, 2 * np.pi, count), Ground(np.array([0.0, 1.0, 0.0]), lowest), camera
+    )
 
 
 def lights(count: int, turn: float = 0.0) -> list[DirectionalLight]:
@@ -131,11 +133,15 @@ class Field:
 
     def impostors_moving(self) -> None:
         """A frame of impostors for a viewer who shifts a little from frame to frame."""
+        self.target.clear(BACKGROUND)
+        self.renderer.draw(*self.shifted_matrices())
+
+    def shifted_matrices(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The viewer's matrices a millimetre or so beside where they were the last time."""
         self._shift = -self._shift
         view_from_world = self.matrices[1].copy()
         view_from_world[0, 3] += self._shift
-        self.target.clear(BACKGROUND)
-        self.renderer.draw(self.matrices[0], view_from_world)
+        return self.matrices[0], view_from_world
 
     def release(self) -> None:
         """Free everything on the GPU."""

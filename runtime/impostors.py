@@ -126,14 +126,6 @@ class ImpostorPass:
         set_state(depth_test=True, depth_write=True, blend=(moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA))
         cache.color.use(0)
         cache.depth.use(1)
-        set_uniforms(
-            self._program,
-            clip_from_world=viewer.clip_from_world,
-            cache_size=(cache.side, cache.side),
-            tiles=0,
-            tile_depth=1,
-            alpha_cutoff=ALPHA_CUTOFF,
-        )
         self._array.render(moderngl.TRIANGLE_STRIP, instances=count)
 
     def forget(self) -> None:
@@ -158,6 +150,15 @@ class ImpostorPass:
         )
         order = np.argsort(-(records["center"] @ _sight(viewer)), kind="stable")
         self._quads.write(records[order])
+        assert self._cache is not None
+        set_uniforms(
+            self._program,
+            clip_from_world=viewer.clip_from_world,
+            cache_size=(self._cache.side, self._cache.side),
+            tiles=0,
+            tile_depth=1,
+            alpha_cutoff=ALPHA_CUTOFF,
+        )
         self.statistics["instances"] = len(records)
         self.statistics["tiles"] = sum(len(tiles.entries) for tiles in self._shown)
 
