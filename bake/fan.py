@@ -23,6 +23,7 @@ VIEWS_AT_ONCE = 16  # exact normals are held for so many views only
 SMALLEST_MIP = 4  # texels
 SPARED_BITS = 4  # of depth: 12 are finer than a quarter of a texel, and the file a fifth smaller
 FARTHEST = 1e6  # bounding radii; from there a perspective picture is an orthographic one, but for rounding
+PLANE_OFFSET = 0.5  # of the way from the centre to the surface
 STEEPEST_PLANE = 1.5  # slope; steeper quads lose more of their sides than they gain in the middle
 
 
@@ -150,7 +151,11 @@ class _Layers:
         return Fan(model.name, layout, views, self._color, normal, self._depth, silhouette, source, settings, *sphere)
 
     def _planes(self, views: Views, silhouette: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """The plane (V, 3) nearest to each view's surface, by least squares over its texels."""
+        """The plane (V, 3) that each view is drawn in: the least-squares one of its surface, moved half way back.
+
+        The surface itself would be best for what lies inside the outline, the centre for the outline: half way
+        between keeps nearly all of the one's PSNR and loses nothing of the other's silhouette.
+        """
         size = silhouette.shape[-1]
         across = (np.arange(size) + 0.5) * (2 / size) - 1
         planes = np.zeros((len(views), 3))
@@ -169,4 +174,5 @@ class _Layers:
                 slope = np.linalg.lstsq(centred, z - plane[0], rcond=1e-6)[0]
                 slope *= min(1, STEEPEST_PLANE / max(np.hypot(*slope), 1e-12))
                 plane[:] = plane[0] - slope @ middle, *slope
+            plane[0] *= PLANE_OFFSET
         return planes

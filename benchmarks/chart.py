@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from PIL import Image, ImageDraw, ImageFont
 
@@ -14,7 +14,9 @@ COLORS = ("#b5442e", "#1f5fa8", "#4a9ad4", "#8a8a8a", "#3f8f4f", "#8a5fb0")
 INK, GRID = "#222222", "#dddddd"
 
 
-def line_chart(series: dict[str, Sequence[tuple[float, float]]], x_label: str, y_label: str, title: str) -> Image.Image:
+def line_chart(
+    series: Mapping[str, Sequence[tuple[float, float]]], x_label: str, y_label: str, title: str
+) -> Image.Image:
     """Draw series of points with positive coordinates.
 
     Parameters

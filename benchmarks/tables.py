@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -52,7 +52,7 @@ class Row:
 
     key: str
     label: str
-    values: dict[str, float | None]
+    values: Mapping[str, float | None]
     bars: tuple[Bar, ...] = ()
     note: str = ""
 

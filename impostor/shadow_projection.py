@@ -18,6 +18,8 @@ from impostor.fan import DEPTH_CODES
 from impostor.strips import Strips
 from impostor.views import View
 
+LEVEL_CAMERA = 0.05
+"""Sine of a camera's elevation over the ground below which it sees the ground as little more than a line."""
 LOWEST_LIGHT = 1e-3
 """Sine of the light's lowest elevation over the ground; there a shadow is a thousand times as long as its object."""
 
@@ -159,6 +161,12 @@ def plane_from_world(view: View, world_from_model: NDArray[np.floating[Any]]) ->
     return rows @ np.linalg.inv(world_from_model)
 
 
+def quad_back(view: View, world_from_model: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    """The direction (3,) from the object toward a fan camera, as the instance is turned in the world."""
+    back = world_from_model[:3, :3] @ view.basis[2]
+    return back / np.linalg.norm(back)
+
+
 def ground_from_sight(eye: ArrayLike, ground: Ground) -> NDArray[np.float64]:
     """Step 5: along the lines of sight onto the ground.
 
@@ -203,8 +211,10 @@ def viewer_ground_from_ground(
 
     Notes
     -----
-    A fan camera that is level with the ground sees it as a line, and then so is the shadow.
+    A fan camera that is level with the ground sees it as a line: below `LEVEL_CAMERA` the true shadow stays.
     """
+    if abs(quad_back(view, world_from_model) @ ground.normal) < LEVEL_CAMERA:
+        return np.eye(4)
     return ground_from_sight(eye, ground) @ quad.world_from_plane() @ plane_from_world(view, world_from_model)
 
 

@@ -91,8 +91,8 @@ class View:
     distance : float
         From the centre to the eye; infinite for an orthographic camera.
     plane : tuple of float
-        Offset and slopes (to the right, up) of the plane z = offset + slope . (x, y) that lies nearest to the surface
-        this camera sees. A quad in it stays true farther away from the camera than one through the centre.
+        Offset and slopes (to the right, up) of the plane z = offset + slope . (x, y) that follows the surface this
+        camera sees. A quad in it stays true farther away from the camera than one through the centre.
     """
 
     basis: NDArray[np.floating[Any]]
@@ -150,7 +150,7 @@ class Views:
     distance : float
         Shared by all views; infinite for orthographic ones.
     plane : ndarray, (V, 3) float64
-        Offset and slopes of the plane nearest to what is seen, as `View.plane`; through the centre if not given.
+        Offset and slopes of the plane that follows what is seen, as `View.plane`; through the centre if not given.
     """
 
     basis: NDArray[np.float64]

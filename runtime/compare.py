@@ -11,10 +11,12 @@ from flip_evaluator import evaluate
 from numpy.typing import ArrayLike, NDArray
 from skimage.metrics import structural_similarity
 
+from impostor.errors import SettingsError
 from impostor.fan import Fan
 from impostor.lighting import DirectionalLight
 from impostor.model import Model
-from runtime.cameras import Camera
+from impostor.views import direction
+from runtime.cameras import FRAME_MARGIN, Camera
 from runtime.offscreen import Offscreen
 from runtime.renderer import DEFAULT_AMBIENT, DEFAULT_LIGHTS, ImpostorRenderer
 
@@ -66,6 +68,19 @@ def between_cameras(fan: Fan, count: int) -> list[float]:
     return ((index + (np.arange(count) + 0.5) / count) * 2 * np.pi / views).tolist()
 
 
+def between_directions(fan: Fan, count: int) -> list[tuple[float, float]]:
+    """Azimuths and elevations in radians of cameras between the fan's views, whatever its layout."""
+    if fan.layout == "ring":
+        elevation = np.radians(float(fan.settings.get("elevation", 0.0)))
+        return [(azimuth, elevation) for azimuth in between_cameras(fan, count)]
+    back = fan.views.basis[:, 2]
+    index = np.arange(count) * len(back) // count
+    near = np.argsort(-(back[index] @ back.T), axis=1)[:, min(1, len(back) - 1)]
+    part = ((np.arange(count) + 0.5) / count)[:, None]
+    x, y, z = ((1 - part) * back[index] + part * back[near]).T
+    return list(zip(np.arctan2(x, z).tolist(), np.arctan2(y, np.hypot(x, z)).tolist(), strict=True))
+
+
 class Comparison:
     """Renders a fan and its mesh through the same cameras and lights.
 
@@ -100,14 +115,21 @@ class Comparison:
         self._truth = Offscreen(ctx, size, size, MESH_SAMPLES)
 
     def pair(self, azimuth: float, elevation: float) -> Pair:
-        """Both pictures from one orthographic camera (radians), on nothing."""
-        camera = Camera.orthographic(*self._sphere, azimuth, elevation)
-        matrices = (camera.clip_from_view, camera.view_from_world)
+        """Both pictures from one camera (radians), on nothing; it has the perspective of the fan's own cameras."""
+        matrices = self._camera(azimuth, elevation).matrices
         self._truth.clear()
         self._meshes.draw_meshes(*matrices)
         self._impostor.clear()
         self._fans.draw(*matrices)
         return Pair(self._truth.color(), self._impostor.color())
+
+    def _camera(self, azimuth: float, elevation: float) -> Camera:
+        (center, radius), distance = self._sphere, self._fan.views.distance
+        if np.isinf(distance):
+            return Camera.orthographic(center, radius, azimuth, elevation)
+        fov_deg = 2 * np.degrees(np.arcsin(min(FRAME_MARGIN * radius / distance, 0.99)))
+        eye = center + distance * direction(azimuth, elevation)
+        return Camera.perspective(eye, center, fov_deg, 1, max(distance - radius, 0.01 * distance), distance + radius)
 
     def rows(
         self,
@@ -116,12 +138,19 @@ class Comparison:
         method: str = "nearest",
         progress: Callable[[int, int], object] = lambda done, total: None,
     ) -> Iterator[tuple[Row, Pair]]:
-        """Measure at each elevation offset; yields a row and its first camera's pair."""
-        base = float(self._fan.settings.get("elevation", 0.0))
+        """Measure at each elevation offset; yields a row and its first camera's pair.
+
+        Raises
+        ------
+        SettingsError
+            Fewer than one camera.
+        """
+        if cameras < 1:
+            raise SettingsError("cameras", f"{cameras}; expected at least 1")
         for number, offset in enumerate(offsets_deg):
             measured, first = [], None
-            for index, azimuth in enumerate(between_cameras(self._fan, cameras)):
-                pair = self.pair(azimuth, np.radians(base + offset))
+            for index, (azimuth, elevation) in enumerate(between_directions(self._fan, cameras)):
+                pair = self.pair(azimuth, elevation + np.radians(offset))
                 first = first or pair
                 measured.append(errors(pair))
                 progress(number * cameras + index + 1, len(offsets_deg) * cameras)

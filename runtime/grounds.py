@@ -32,7 +32,7 @@ class GroundSurface:
     reach : float
         Metres to where it is gone; it starts to fade at half of that.
     background : tuple of float
-        What it fades into: sRGB curve, premultiplied, with alpha.
+        What it fades into: sRGB curve, premultiplied. Without alpha, as it is, that is what was drawn before.
     """
 
     albedo: tuple[float, float, float] = (0.5, 0.5, 0.5)
@@ -70,7 +70,7 @@ class GroundPass:
         metres = surface.reach * np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]], float)
         self._corners.write(np.hstack([metres @ axes + middle, metres]).astype("f4").tobytes())
         state.bind_target()
-        set_state(depth_test=True, depth_write=True)
+        set_state(depth_test=True, depth_write=True, blend=(moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA))
         self._texture(surface).use(0)
         lights.bind(self._program, unit=1)
         set_uniforms(

@@ -213,8 +213,9 @@ def nearest_views(
 def quads_toward(instances: Instances, eye: NDArray[np.float64]) -> Quads:
     """The nearest view of every visible instance, set up in the world (the paper's figure 2).
 
-    The quad lies in the plane nearest to the surface its view shows, turned with the instance: seen from the view's
+    The quad lies in the plane that follows the surface its view shows, turned with the instance: seen from the view's
     own camera that makes no difference, and from beside it what lies in the plane is drawn where the mesh would be.
+    Copies with a position, yaw or scale that is not finite are left out.
 
     Parameters
     ----------
@@ -226,7 +227,8 @@ def quads_toward(instances: Instances, eye: NDArray[np.float64]) -> Quads:
     -------
     Quads
     """
-    views, index = instances.fan.views, np.flatnonzero(instances.visible)
+    finite = np.isfinite(instances.positions).all(axis=1) & np.isfinite(instances.yaws) & np.isfinite(instances.scales)
+    views, index = instances.fan.views, np.flatnonzero(instances.visible & finite)
     view, toward = nearest_views(instances, eye, index)
     rotation, scale = rotation_about_y(instances.yaws[index]), instances.scales[index]
     origin = instances.positions[index] + scale[:, None] * np.einsum("nij,nj->ni", rotation, views.center[view])

@@ -21,6 +21,7 @@ ROW_DTYPE = np.dtype(
         ("gloss", "f4", (2,)),
     ]
 )
+SPAN_DTYPE = np.dtype([("first", "f4"), ("end", "f4")])
 TILE_DTYPE = np.dtype([("place", "f4", (4,)), ("part", "f4", (4,)), ("origin", "f4", (3,))])
 CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]], np.float32)
 
@@ -57,39 +58,55 @@ class ColormapPass:
         self._program = load_program(ctx, "colormap.vert", "colormap.frag")
         self._normals = ctx.texture((256, 1), 4, _padded_normals().tobytes(), dtype="f4")
         self.texture = ctx.texture((512, self.ROWS), 4, dtype="f4")
-        self.texture.filter = self._normals.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._rows = ctx.texture((ROW_DTYPE.itemsize // 16, self.ROWS), 4, dtype="f4")
+        for texture in (self.texture, self._normals, self._rows):
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._target = ctx.framebuffer([self.texture])
         self._corners = ctx.buffer(CORNERS)
-        self._rows = InstanceBuffer(ctx, ROW_DTYPE)
-        self._array = ctx.vertex_array(
-            self._program,
-            [
-                (self._corners, "2f", "corner"),
-                (self._rows.buffer, "1f 3f 3f 3f 4f 2f/i", "row", "right", "up", "back", "albedo", "gloss"),
-            ],
-        )
+        self._spans = InstanceBuffer(ctx, SPAN_DTYPE)
+        layout = [(self._corners, "2f", "corner"), (self._spans.buffer, "2f/i", "span")]
+        self._array = ctx.vertex_array(self._program, layout)
 
     def write(self, rows: NDArray[np.void], lights: LightTable, normals_for: NDArray[np.float64] | None = None) -> None:
-        """Fill the rows named in a ROW_DTYPE array; changes the bound framebuffer and texture units 0 and 1.
+        """Fill the rows named in a ROW_DTYPE array; changes the bound framebuffer and texture units 0 to 2.
 
         With `normals_for`, a viewer's (3, 3) rotation from world to view, the entries are that viewer's normals as
         n / 2 + 1/2 instead of light.
         """
-        self._rows.write(rows)
+        rows = rows[np.argsort(rows["row"])]
+        # Neighbouring rows are one rectangle: a rasteriser that works on blocks of pixels wastes most of a thin one.
+        runs = np.split(rows, np.flatnonzero(np.diff(rows["row"]) != 1) + 1)
+        for run in runs:
+            self._rows.write(run.tobytes(), viewport=(0, int(run["row"][0]), self._rows.width, len(run)))
+        self._spans.write(np.array([(run["row"][0], run["row"][-1] + 1) for run in runs], SPAN_DTYPE))
         self._target.use()
         set_state()
         self._normals.use(0)
         lights.bind(self._program, unit=1)
-        set_uniforms(self._program, byte_to_normal=0, row_count=self.ROWS)
+        self._rows.use(2)
         show_normals = normals_for is not None
         set_uniforms(
-            self._program, show_normals=show_normals, view_from_world=normals_for if show_normals else np.eye(3)
+            self._program,
+            byte_to_normal=0,
+            rows=2,
+            row_count=self.ROWS,
+            columns=256 if rows["albedo"][:, 3].all() else 512,
+            show_normals=show_normals,
+            view_from_world=normals_for if show_normals else np.eye(3),
         )
-        self._array.render(moderngl.TRIANGLE_STRIP, instances=len(rows))
+        self._array.render(moderngl.TRIANGLE_STRIP, instances=len(runs))
 
     def release(self) -> None:
         """Free everything this pass made."""
-        for resource in (self._array, self._rows, self._corners, self._target, self.texture, self._normals):
+        for resource in (
+            self._array,
+            self._rows,
+            self._spans,
+            self._corners,
+            self._target,
+            self.texture,
+            self._normals,
+        ):
             resource.release()
         self._program.release()
 

@@ -97,12 +97,19 @@ class ImpostorRenderer:
         -------
         MeshInstance
             Its `world_from_model` may be changed at any time.
+
+        Raises
+        ------
+        SettingsError
+            Another shape, or a number that is not finite.
         """
+        matrix = np.eye(4) if world_from_model is None else np.array(world_from_model, float)
+        if matrix.shape != (4, 4) or not np.all(np.isfinite(matrix)):
+            raise SettingsError(model.name, f"world_from_model of shape {matrix.shape}; expected (4, 4), all finite")
         buffers = next((mesh.buffers for mesh in self._meshes if mesh.buffers.model is model), None)
         if buffers is None:
             with preserved_state(self._ctx):
                 buffers = MeshBuffers(self._ctx, model)
-        matrix = np.eye(4) if world_from_model is None else np.array(world_from_model, float)
         self._meshes.append(MeshInstance(buffers, matrix, gloss or Gloss()))
         return self._meshes[-1]
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from impostor.fan import Fan
 from impostor.lighting import DirectionalLight
-from impostor.shadow_projection import Ground, casts_shadow, ground_from_sight, strip_points
+from impostor.shadow_projection import LEVEL_CAMERA, Ground, casts_shadow, ground_from_sight, strip_points
 from impostor.strips import silhouette_strips
 from impostor.views import rotation_about_y
 from runtime.gl_state import CallerState, clear_color, set_state
@@ -119,8 +119,11 @@ class ShadowPass:
         casting_fans = [
             (instances, seen, _casters(instances, seen, viewer, ground)) for instances, seen in shown if len(seen)
         ]
-        for start in range(0, len(casting), MOST_LIGHTS):
-            group = [lights[index] for index in casting[start : start + MOST_LIGHTS]]
+        # Marks of four lights stand in each picture, pictures on top of each other in one texture.
+        pictures = self._ctx.info["GL_MAX_TEXTURE_SIZE"] // _size(viewer)[1]
+        at_once = min(MOST_LIGHTS, CHANNELS * max(pictures, 1))
+        for start in range(0, len(casting), at_once):
+            group = [lights[index] for index in casting[start : start + at_once]]
             corners = _ground_rectangle(casting_fans, meshes, viewer, group, ground)
             if corners is None:
                 continue
@@ -258,7 +261,9 @@ def _casters(instances: Instances, seen: Quads, viewer: Viewer, ground: Ground) 
     right, up = seen.right / seen.scale[:, None], seen.up / seen.scale[:, None]
     world_from_plane[:, :3] = np.stack([right, up, seen.center], axis=-1)
     world_from_plane[:, 3, 2] = 1
+    level = np.abs(seen.basis[:, 2] @ ground.normal) < LEVEL_CAMERA
     casters["rows"] = ground_from_sight(viewer.eye, ground) @ world_from_plane @ plane_from_world
+    casters["rows"][level] = np.eye(4)
     return casters
 
 

@@ -16,7 +16,7 @@ void main() {
     if (color.a < alpha_cutoff) discard;
     // gl_FragCoord holds z / w and 1 / w of the quad; the surface lies this far from it, toward the eye.
     float offset = (v_depth_start + textureLod(tile_depth, uv, 0.0).r * v_depth_span) * gl_FragCoord.w;
-    // What reaches past the eye, where w is not positive, is in front of everything: a depth far below 0 counts as 0.
+    // What reaches past the eye, where w is not positive, is in front of everything.
     float w = max(1.0 + offset * v_toward_eye.y, 1e-6);
-    gl_FragDepth = (gl_FragCoord.z + offset * v_toward_eye.x) / w;
+    gl_FragDepth = clamp((gl_FragCoord.z + offset * v_toward_eye.x) / w, 0.0, 1.0);
 }

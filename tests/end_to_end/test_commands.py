@@ -197,15 +197,15 @@ def test_perspective_sees_the_object_where_it_stands(sphere, tmp_path):
         assert rows.mean() == pytest.approx(50, abs=0.5) and columns.mean() == pytest.approx(50, abs=0.5)
         assert edge - 1.5 < np.ptp(columns) + 1 < largest * edge + 1
         # Looking past it to the right puts it on the left.
-        aside = np.nonzero(rendered(subject, tmp_path / "a.png", *eye, "--target", "4,1,-2") >= 128)[1]
-        assert aside.mean() == pytest.approx(50 - 50.5 * np.tan(np.arctan(1 / 20)) / np.tan(np.radians(5)), abs=1)
+        aside = np.nonzero(rendered(subject, tmp_path / "a.png", *eye, "--target", "3.5,1,-2") >= 128)[1]
+        assert aside.mean() == pytest.approx(50 - 50.5 * (0.5 / 20) / np.tan(np.radians(5)), abs=1)
 
 
 def test_an_eye_without_a_target_looks_at_the_middle(sphere, tmp_path):
     for subject in sphere:
-        flags = ("--size", "101x101", "--eye", "23,11,3", "--fov", 10, "--output", "alpha")
+        flags = ("--size", "101x101", "--eye", "23,1,-2", "--fov", 10, "--output", "alpha")
         rows, columns = np.nonzero(rendered(subject, tmp_path / "a.png", *flags) >= 128)
-        assert rows.mean() == pytest.approx(50, abs=3) and columns.mean() == pytest.approx(50, abs=1)
+        assert rows.mean() == pytest.approx(50, abs=1) and columns.mean() == pytest.approx(50, abs=1)
 
 
 def test_depth_is_white_at_the_near_end(sphere, tmp_path):
@@ -225,7 +225,7 @@ def test_a_shadow_falls_away_from_the_light_and_can_be_left_out(sphere, tmp_path
         object_only = rendered(subject, tmp_path / "a.png", *flags, *BARE)
         beside = (object_only[..., 3] == 0) & (np.arange(96)[:, None] > 48)
         columns = np.nonzero(beside & (lit < 0.6 * np.median(lit[beside])))[1]
-        assert len(columns) > 60
+        assert len(columns) > 40
         assert columns.mean() > np.nonzero(object_only[..., 3])[1].mean() + 5  # the light is on the left
 
 

@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 from flip_evaluator import evaluate
 
+from bake.fan import bake_fan
 from impostor.lighting import DirectionalLight
+from impostor.views import direction
 from runtime.compare import (
     HIGHEST_PSNR,
     Comparison,
     Pair,
     as_json,
     between_cameras,
+    between_directions,
     errors,
     over_background,
     side_by_side,
@@ -86,7 +89,7 @@ def test_edges_are_seen_over_a_background():
 @pytest.mark.parametrize("views", [1, 7, 96])
 @pytest.mark.parametrize("count", [1, 8, 13])
 def test_cameras_stand_between_views_and_go_around(views, count):
-    fan = solid_fan(Sphere(), views=views, size=8) if views < 90 else solid_fan(Sphere(), views=96, size=8)
+    fan = solid_fan(Sphere(), views=views, size=8)
     azimuths = np.array(between_cameras(fan, count))
     assert len(np.unique(azimuths.round(9))) == count
     gap = azimuths / (2 * np.pi / views) % 1
@@ -146,3 +149,21 @@ def test_flip_is_the_error_map_of_its_authors():
     pictures[..., 3] = 255
     stated = evaluate(*(over_background(picture) for picture in pictures), "LDR")[1]
     assert errors(Pair(*pictures))[2] == pytest.approx(stated, rel=1e-4)
+
+
+@pytest.mark.parametrize("layout", ["hemisphere", "sphere"])
+def test_cameras_stand_between_the_views_of_every_layout(layout):
+    fan = bake_fan(MODEL, views=24, layout=layout, size=16)
+    directions = between_directions(fan, 6)
+    cosines = np.array([direction(*angles) @ fan.views.basis[:, 2].T for angles in directions]).max(axis=1)
+    gap = np.sqrt(4 * np.pi / 24)
+    assert (cosines < 1 - 1e-4).all()
+    assert (cosines > np.cos(gap)).all()
+
+
+def test_a_perspective_fan_is_compared_from_its_own_distance(ctx):
+    fan = bake_fan(MODEL, views=32, size=64, distance=6.0)
+    comparison = Comparison(ctx, fan, MODEL)
+    (row, _), *_ = comparison.rows([0], 4)
+    comparison.release()
+    assert row.iou > 0.95

@@ -1,11 +1,13 @@
 """What the documents say is so: links lead somewhere, tests they name exist, numbers are the benchmark's."""
 
+import json
 import re
 import subprocess
 from pathlib import Path
 
 import pytest
 
+import benchmarks.readme as readme_table
 from tests.data import ROOT
 
 DOCUMENTS = ["README.md", "CONVENTIONS.md", "CHANGELOG.md", "docs/method.md", "docs/embedding.md"]
@@ -52,3 +54,8 @@ def test_nothing_names_an_address_or_a_machine():
     kinds = ("*.toml", "*.txt", "Makefile", "*.sh")
     files = [path for kind in kinds for path in Path(ROOT).glob(kind)] + list((ROOT / "tools").iterdir())
     assert not [str(path) for path in files if places.search(path.read_text())]
+
+
+def test_the_numbers_of_the_readme_are_the_benchmarks():
+    readme = readme_table.README.read_text()
+    assert readme_table.with_table(readme, json.loads(readme_table.RESULTS.read_text())) == readme

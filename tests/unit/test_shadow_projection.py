@@ -139,6 +139,16 @@ def test_seen_by_its_own_camera_the_shadow_stays_where_it_is(distance, ground):
     np.testing.assert_allclose(divided(result), points, atol=1e-9)
 
 
+@pytest.mark.parametrize("distance", [np.inf, 6.0])
+def test_a_camera_level_with_the_ground_leaves_the_true_shadow(distance):
+    ground = Ground(np.array([0.0, 1.0, 0.0]), 0.0)
+    view = view_from(-0.8, 0.0, distance)
+    eye = np.array([3.0, 0.4, 5.0, 1.0])
+    matrix = viewer_ground_from_ground(view, PLACED, Quad.unturned(view, PLACED), eye, ground)
+    points = ground_points(ground)
+    np.testing.assert_allclose(divided(homogeneous(points) @ matrix.T), points, atol=1e-9)
+
+
 @pytest.mark.parametrize("turn", [True, False], ids=["turned", "unturned"])
 @pytest.mark.parametrize("perspective_viewer", [True, False])
 @pytest.mark.parametrize("distance", [np.inf, 6.0])

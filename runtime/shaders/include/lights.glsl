@@ -5,17 +5,14 @@ uniform vec3 ambient;
 
 void shade(vec3 normal, vec3 toward_eye, vec2 gloss, out vec3 diffuse, out vec3 specular) {
     diffuse = ambient;
+    for (int i = 0; i < light_count; ++i)
+        diffuse += texelFetch(lights, ivec2(1, i), 0).rgb * max(dot(normal, texelFetch(lights, ivec2(0, i), 0).xyz), 0.0);
     specular = vec3(0.0);
-    for (int i = 0; i < light_count; ++i) {
+    // A loop of its own that a matt surface never enters: a software rasteriser also runs what an `if` leaves out.
+    int highlights = gloss.x > 0.0 ? light_count : 0;
+    for (int i = 0; i < highlights; ++i) {
         vec3 toward = texelFetch(lights, ivec2(0, i), 0).xyz;
-        float facing = dot(normal, toward);
-        if (facing > 0.0) {
-            vec3 color = texelFetch(lights, ivec2(1, i), 0).rgb;
-            diffuse += color * facing;
-            if (gloss.x > 0.0) {
-                float along = max(dot(normal, normalize(toward + toward_eye)), 0.0);
-                specular += color * gloss.x * pow(along, gloss.y);
-            }
-        }
+        float along = max(dot(normal, normalize(toward + toward_eye)), 0.0);
+        if (dot(normal, toward) > 0.0) specular += texelFetch(lights, ivec2(1, i), 0).rgb * gloss.x * pow(along, gloss.y);
     }
 }
