@@ -35,7 +35,7 @@ def table(results: dict[str, Any]) -> str:
         ("Against the mesh, between the baked views: dragon", picture("dragon")),
         ("bunny", picture("bunny")),
         ("DamagedHelmet, textured", picture("helmet")),
-        ("a tree of alpha-masked leaves", picture("leaves")),
+        ("a tree of leaf cards", picture("leaves")),
         ("Impostor + shadow against the mesh, 1280x720: 1 dragon 400 pixels high",
          f"{value('frames', '1', 'speed_up'):.0f}x faster"),
         ("100 dragons 60 pixels high", f"{value('frames', '100', 'speed_up'):.0f}x faster"),

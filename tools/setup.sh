@@ -41,7 +41,7 @@ fi
     "$python" -m venv .venv
 }
 say "installing the pinned packages (a minute or two the first time)"
-pip=(.venv/bin/python -m pip --quiet --disable-pip-version-check install -c constraints.txt)
+pip=(.venv/bin/python -m pip -qq --disable-pip-version-check install -c constraints.txt)
 "${pip[@]}" setuptools
 "${pip[@]}" --no-build-isolation -e '.[dev]'
 
