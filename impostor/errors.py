@@ -47,3 +47,11 @@ class GpuError(ImpostorError):
 
 class ModelWarning(UserWarning):
     """Something in a model that was drawn differently from what its file asks for."""
+
+
+class PtmFileError(ImpostorError):
+    """A `.ptm` file that is truncated, lies about itself, or is of a kind that is not read."""
+
+
+class LpFileError(ImpostorError):
+    """A `.lp` file that does not say where the light was."""

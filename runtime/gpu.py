@@ -92,6 +92,22 @@ def set_uniforms(program: moderngl.Program, **values: object) -> None:
             uniform.value = value
 
 
+class InstanceBuffer:
+    """A vertex buffer of per-instance records that grows as needed."""
+
+    def __init__(self, ctx: moderngl.Context, dtype: np.dtype, count: int = 64):
+        self.buffer = ctx.buffer(reserve=dtype.itemsize * count, dynamic=True)
+
+    def write(self, records: NDArray[np.void]) -> None:
+        """Upload the records; the buffer's old contents are given up, so the GPU need not wait."""
+        self.buffer.orphan(max(records.nbytes, self.buffer.size))
+        self.buffer.write(records)
+
+    def release(self) -> None:
+        """Free the buffer."""
+        self.buffer.release()
+
+
 def check_texture_size(ctx: moderngl.Context, what: str, width: int, height: int) -> None:
     """Refuse an image that the GPU cannot hold.
 

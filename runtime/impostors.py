@@ -112,7 +112,7 @@ class ImpostorPass:
             # Normals turn with the viewer, so nothing lit before can be kept.
             self.forget()
         self._normals_for = viewer.view_from_world[:3, :3] if output == "normal" else None
-        frame = _frame_key(batches, viewer)
+        frame = (viewer.key, *((id(batch.textures), *batch.instances.key) for batch in batches))
         if frame != self._frame:
             # Where nothing has moved, the last frame's quads are this one's.
             self._frame = None
@@ -292,18 +292,6 @@ def _records(batch: Batch, quads: Quads, places: NDArray[np.int32]) -> NDArray[n
     depth = np.stack([low - offset, high - low, -slope_right * reach[:, 0], -slope_up * reach[:, 0]], axis=-1)
     records["depth"] = depth * quads.scale[:, None]
     return records
-
-
-def _frame_key(batches: Sequence[Batch], viewer: Viewer) -> tuple[object, ...]:
-    """Equal for two frames that show the same quads."""
-    copies = [batch.instances for batch in batches]
-    return (
-        viewer.clip_from_view.tobytes(),
-        viewer.view_from_world.tobytes(),
-        viewer.viewport,
-        *((id(batch.textures), batch.instances.gloss) for batch in batches),
-        *(array.tobytes() for each in copies for array in (each.positions, each.yaws, each.scales, each.visible)),
-    )
 
 
 def _sight(viewer: Viewer) -> NDArray[np.float64]:

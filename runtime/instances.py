@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,13 @@ from impostor.errors import SettingsError
 from impostor.fan import Fan
 from impostor.lighting import Gloss
 from impostor.views import rotation_about_y
+from runtime.checks import check_type, numbers
 
 
 class Instances:
     """N copies of one fan. The arrays may be written in place at any time; the next draw shows it.
+
+    An array that is replaced as a whole keeps its identity: the new values are checked and written into it.
 
     Parameters
     ----------
@@ -37,7 +41,8 @@ class Instances:
     Raises
     ------
     SettingsError
-        Arrays whose lengths differ, a number that is not finite, a scale that is not positive.
+        No fan, arrays whose lengths differ, a number that is not finite, a scale that is not positive. Also where an
+        array is replaced; of what is written into one, copies that cannot be drawn are left out.
     """
 
     def __init__(
@@ -48,29 +53,57 @@ class Instances:
         scales: ArrayLike = 1.0,
         gloss: Gloss | None = None,
     ):
+        check_type("fan", fan, Fan, ", as impostor.load gives")
         self.fan, self.gloss = fan, gloss or Gloss()
-        given = np.asarray(positions, float)
-        self.positions = np.array(np.atleast_2d(given) if given.size else given.reshape(0, 3))
-        count = len(self.positions)
-        if self.positions.shape != (count, 3):
-            raise SettingsError(fan.name, f"positions of shape {self.positions.shape}; expected (N, 3)")
-        self.yaws, self.scales = _one_each("yaws", yaws, count, fan), _one_each("scales", scales, count, fan)
-        self.visible = np.ones(count, bool)
-        for name in ("positions", "yaws", "scales"):
-            if not np.all(np.isfinite(getattr(self, name))):
-                raise SettingsError(fan.name, f"{name} hold a number that is not finite; expected finite ones")
-        if np.any(self.scales <= 0):
-            raise SettingsError(fan.name, f"scales go down to {self.scales.min():g}; expected more than 0")
+        check_type("gloss", self.gloss, Gloss)
+        self._positions = np.array(numbers(fan.name, "positions", positions, (-1, 3), (3,), (0,)).reshape(-1, 3))
+        count = len(self._positions)
+        self._yaws, self._scales, self._visible = np.zeros(count), np.ones(count), np.ones(count, bool)
+        self.yaws, self.scales = yaws, scales
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        return self._positions
+
+    @positions.setter
+    def positions(self, values: ArrayLike) -> None:
+        self._positions[:] = numbers(self.fan.name, "positions", values, self._positions.shape)
+
+    @property
+    def yaws(self) -> NDArray[np.float64]:
+        return self._yaws
+
+    @yaws.setter
+    def yaws(self, values: ArrayLike) -> None:
+        self._yaws[:] = numbers(self.fan.name, "yaws", values, self._yaws.shape, ())
+
+    @property
+    def scales(self) -> NDArray[np.float64]:
+        return self._scales
+
+    @scales.setter
+    def scales(self, values: ArrayLike) -> None:
+        scales = numbers(self.fan.name, "scales", values, self._scales.shape, ())
+        if np.any(scales <= 0):
+            raise SettingsError(self.fan.name, f"scales go down to {scales.min():g}; expected more than 0")
+        self._scales[:] = scales
+
+    @property
+    def visible(self) -> NDArray[np.bool_]:
+        return self._visible
+
+    @visible.setter
+    def visible(self, values: ArrayLike) -> None:
+        self._visible[:] = numbers(self.fan.name, "visible", values, self._visible.shape, ()) != 0
 
     def __len__(self) -> int:
         return len(self.positions)
 
-
-def _one_each(name: str, values: ArrayLike, count: int, fan: Fan) -> NDArray[np.float64]:
-    array = np.asarray(values, float)
-    if array.shape not in ((), (count,)):
-        raise SettingsError(fan.name, f"{name} of shape {array.shape}; expected ({count},), one for each position")
-    return np.array(np.broadcast_to(array, (count,)))
+    @property
+    def key(self) -> tuple[object, ...]:
+        """Equal while the copies stand as they stood."""
+        arrays = (self.positions, self.yaws, self.scales, self.visible)
+        return (id(self.fan), self.gloss, *(array.tobytes() for array in arrays))
 
 
 @dataclass(frozen=True)
@@ -96,24 +129,33 @@ class Viewer:
         Raises
         ------
         SettingsError
-            Not 4x4, not finite, or a view that cannot be inverted.
+            Not 4x4, not finite, without an inverse, or a view for row vectors.
         """
-        matrices = []
-        for name, matrix in (("clip_from_view", clip_from_view), ("view_from_world", view_from_world)):
-            array = np.asarray(matrix, float)
-            if array.shape != (4, 4) or not np.all(np.isfinite(array)):
-                raise SettingsError(name, f"shape {array.shape}; expected a (4, 4) matrix of finite numbers")
-            if abs(np.linalg.det(array)) < 1e-30:
-                raise SettingsError(name, "its determinant is 0; expected a matrix that can be inverted")
-            matrices.append(array)
-        return cls(matrices[0], matrices[1], tuple(viewport))
+        clip = numbers("camera", "clip_from_view", clip_from_view, (4, 4))
+        view = numbers("camera", "view_from_world", view_from_world, (4, 4))
+        *turned, one = view[3].tolist()
+        if max(map(abs, turned)) > 1e-6 or abs(one - 1) > 1e-6:
+            row = ", ".join(f"{value:g}" for value in view[3])
+            expected = "(0, 0, 0, 1): column vectors, not rows"
+            raise SettingsError("camera", f"view_from_world has the last row ({row}); expected {expected}")
+        viewer = cls(clip, view, tuple(viewport))
+        scaled = viewer.clip_from_world / np.maximum(np.maximum.reduce(np.abs(viewer.clip_from_world)), 1e-300)
+        # Whatever its units, rounding leaves a singular matrix about 1e-16 of the volume that its rows could span.
+        if not abs(np.linalg.det(scaled)) > 1e-13 * np.maximum.reduce(np.abs(scaled), axis=1).prod():
+            raise SettingsError("camera", "clip_from_view @ view_from_world has no inverse; expected one that has")
+        return viewer
 
     @property
+    def key(self) -> tuple[object, ...]:
+        """Equal for two viewers that see the same."""
+        return self.clip_from_view.tobytes(), self.view_from_world.tobytes(), self.viewport
+
+    @cached_property
     def clip_from_world(self) -> NDArray[np.float64]:
         """(4, 4) float64."""
         return self.clip_from_view @ self.view_from_world
 
-    @property
+    @cached_property
     def eye(self) -> NDArray[np.float64]:
         """The point where all lines of sight meet, homogeneous (4,) in world space.
 
@@ -215,7 +257,7 @@ def quads_toward(instances: Instances, eye: NDArray[np.float64]) -> Quads:
 
     The quad lies in the plane that follows the surface its view shows, turned with the instance: seen from the view's
     own camera that makes no difference, and from beside it what lies in the plane is drawn where the mesh would be.
-    Copies with a position, yaw or scale that is not finite are left out.
+    Copies with a number that is not finite, or a scale that is not positive, are left out.
 
     Parameters
     ----------
@@ -227,8 +269,9 @@ def quads_toward(instances: Instances, eye: NDArray[np.float64]) -> Quads:
     -------
     Quads
     """
-    finite = np.isfinite(instances.positions).all(axis=1) & np.isfinite(instances.yaws) & np.isfinite(instances.scales)
-    views, index = instances.fan.views, np.flatnonzero(instances.visible & finite)
+    # Not a number in any of them makes the sum none either.
+    finite = np.isfinite(instances.positions.sum(axis=1) + instances.yaws + instances.scales)
+    views, index = instances.fan.views, np.flatnonzero(instances.visible & finite & (instances.scales > 0))
     view, toward = nearest_views(instances, eye, index)
     rotation, scale = rotation_about_y(instances.yaws[index]), instances.scales[index]
     origin = instances.positions[index] + scale[:, None] * np.einsum("nij,nj->ni", rotation, views.center[view])

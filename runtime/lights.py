@@ -8,8 +8,23 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike
 
+from impostor.errors import SettingsError
 from impostor.lighting import DirectionalLight
 from runtime.gpu import check_texture_size, set_uniforms
+
+
+def check_lights(lights: Sequence[DirectionalLight]) -> None:
+    """Refuse what is not a sequence of lights.
+
+    Raises
+    ------
+    SettingsError
+    """
+    if not isinstance(lights, Sequence) or isinstance(lights, str):
+        raise SettingsError("lights", f"a {type(lights).__name__}; expected a list of DirectionalLight")
+    for number, light in enumerate(lights):
+        if not isinstance(light, DirectionalLight):
+            raise SettingsError("lights", f"number {number} is a {type(light).__name__}; expected a DirectionalLight")
 
 
 class LightTable:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from impostor.normal_code import BYTE_TO_NORMAL
 from runtime.fan_textures import FanTextures
 from runtime.gl_state import set_state
-from runtime.gpu import load_program, set_uniforms
+from runtime.gpu import InstanceBuffer, load_program, set_uniforms
 from runtime.lights import LightTable
 from runtime.tiles import TileCache
 
@@ -24,22 +24,6 @@ ROW_DTYPE = np.dtype(
 SPAN_DTYPE = np.dtype([("first", "f4"), ("end", "f4")])
 TILE_DTYPE = np.dtype([("place", "f4", (4,)), ("part", "f4", (4,)), ("origin", "f4", (3,))])
 CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]], np.float32)
-
-
-class InstanceBuffer:
-    """A vertex buffer of per-instance records that grows as needed."""
-
-    def __init__(self, ctx: moderngl.Context, dtype: np.dtype, count: int = 64):
-        self.buffer = ctx.buffer(reserve=dtype.itemsize * count, dynamic=True)
-
-    def write(self, records: NDArray[np.void]) -> None:
-        """Upload the records; the buffer's old contents are given up, so the GPU need not wait."""
-        self.buffer.orphan(max(records.nbytes, self.buffer.size))
-        self.buffer.write(records)
-
-    def release(self) -> None:
-        """Free the buffer."""
-        self.buffer.release()
 
 
 class ColormapPass:

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import moderngl
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from impostor.errors import SettingsError
+from impostor.errors import GpuError, SettingsError
 from impostor.fan import Fan
 from impostor.lighting import DirectionalLight, Gloss
 from impostor.model import Model
 from impostor.shadow_projection import Ground
+from runtime.checks import check_type, numbers
 from runtime.fan_textures import FanTextures
-from runtime.gl_state import preserved_state
+from runtime.gl_state import CallerState, preserved_state
 from runtime.grounds import GroundPass, GroundSurface
 from runtime.impostors import Batch, ImpostorPass
 from runtime.instances import Instances, Viewer
-from runtime.lights import LightTable
+from runtime.lights import LightTable, check_lights
 from runtime.meshes import OUTPUTS, MeshBuffers, MeshInstance, MeshPass
 from runtime.shadows import ShadowPass
 
@@ -42,9 +44,9 @@ class ImpostorRenderer:
     Attributes
     ----------
     lights : sequence of DirectionalLight
-        May be replaced at any time; the next draw shows it.
-    ambient : float or (3,) array_like
-        Linear light that reaches every normal.
+        May be replaced or changed in place at any time; the next draw shows it.
+    ambient : ndarray, (3,) float64
+        Linear light that reaches every normal; set as one number or three. Read-only: replace it.
 
     Examples
     --------
@@ -55,15 +57,35 @@ class ImpostorRenderer:
     """
 
     def __init__(self, ctx: moderngl.Context, cache_side: int = 4096):
-        self._ctx = ctx
-        self.lights: Sequence[DirectionalLight] = DEFAULT_LIGHTS
-        self.ambient: ArrayLike = DEFAULT_AMBIENT
+        self._ctx, self._released = ctx, False
+        self.lights, self.ambient = DEFAULT_LIGHTS, DEFAULT_AMBIENT
         with preserved_state(ctx):
             self._impostors = ImpostorPass(ctx, cache_side)
             self._mesh_pass, self._ground_pass, self._shadows = MeshPass(ctx), GroundPass(ctx), ShadowPass(ctx)
             self._table = LightTable(ctx)
         self._batches: list[Batch] = []
         self._meshes: list[MeshInstance] = []
+
+    @property
+    def lights(self) -> Sequence[DirectionalLight]:
+        return self._lights
+
+    @lights.setter
+    def lights(self, lights: Sequence[DirectionalLight]) -> None:
+        check_lights(lights)
+        self._lights = lights
+
+    @property
+    def ambient(self) -> NDArray[np.float64]:
+        return self._ambient
+
+    @ambient.setter
+    def ambient(self, ambient: ArrayLike) -> None:
+        light = np.array(np.broadcast_to(numbers("ambient", "light", ambient, (), (3,)), (3,)))
+        if np.any(light < 0):
+            raise SettingsError("ambient", f"light goes down to {light.min():g}; expected at least 0")
+        light.flags.writeable = False
+        self._ambient = light
 
     def add(
         self,
@@ -73,7 +95,14 @@ class ImpostorRenderer:
         scales: ArrayLike = 1.0,
         gloss: Gloss | None = None,
     ) -> Instances:
-        """Place copies of a fan; see `Instances`. A fan that was added before shares its textures."""
+        """Place copies of a fan; see `Instances`. A fan that was added before shares its textures.
+
+        Raises
+        ------
+        SettingsError
+            What `Instances` cannot be made of.
+        """
+        self._check_in_use()
         instances = Instances(fan, positions, yaws, scales, gloss)
         textures = next((batch.textures for batch in self._batches if batch.instances.fan is fan), None)
         if textures is None:
@@ -101,11 +130,14 @@ class ImpostorRenderer:
         Raises
         ------
         SettingsError
-            Another shape, or a number that is not finite.
+            No model; a matrix of another shape, with a number that is not finite, or without an inverse.
         """
-        matrix = np.eye(4) if world_from_model is None else np.array(world_from_model, float)
-        if matrix.shape != (4, 4) or not np.all(np.isfinite(matrix)):
-            raise SettingsError(model.name, f"world_from_model of shape {matrix.shape}; expected (4, 4), all finite")
+        self._check_in_use()
+        check_type("model", model, Model, ", as impostor.load_model gives")
+        given = np.eye(4) if world_from_model is None else world_from_model
+        matrix = np.array(numbers(model.name, "world_from_model", given, (4, 4)))
+        if not abs(np.linalg.det(matrix)) > 0:
+            raise SettingsError(model.name, "world_from_model has no inverse; expected a matrix that has one")
         buffers = next((mesh.buffers for mesh in self._meshes if mesh.buffers.model is model), None)
         if buffers is None:
             with preserved_state(self._ctx):
@@ -142,17 +174,17 @@ class ImpostorRenderer:
         Raises
         ------
         SettingsError
-            A matrix of another shape, or one that cannot be inverted; another output.
+            A matrix of another shape, one without an inverse or for row vectors; another output.
+        GpuError
+            The renderer has been released.
         """
-        with preserved_state(self._ctx) as state:
-            viewer = Viewer.from_matrices(clip_from_view, view_from_world, state.viewport)
+        with self._frame(clip_from_view, view_from_world) as (state, viewer):
             self._update_lights(output)
             self._impostors.draw(state, self._batches, viewer, self._table, output)
 
     def draw_meshes(self, clip_from_view: ArrayLike, view_from_world: ArrayLike, output: str = "lit") -> None:
         """Draw the meshes that `add_mesh` placed; parameters as `draw`."""
-        with preserved_state(self._ctx) as state:
-            viewer = Viewer.from_matrices(clip_from_view, view_from_world, state.viewport)
+        with self._frame(clip_from_view, view_from_world) as (state, viewer):
             self._update_lights(output)
             self._mesh_pass.draw(state, self._meshes, viewer, self._table, output)
 
@@ -160,8 +192,9 @@ class ImpostorRenderer:
         self, clip_from_view: ArrayLike, view_from_world: ArrayLike, ground: Ground, surface: GroundSurface
     ) -> None:
         """Draw a lit plane, for callers who have no ground of their own."""
-        with preserved_state(self._ctx) as state:
-            viewer = Viewer.from_matrices(clip_from_view, view_from_world, state.viewport)
+        check_type("ground", ground, Ground)
+        _check_surface(surface)
+        with self._frame(clip_from_view, view_from_world) as (state, viewer):
             self._update_lights("lit")
             self._ground_pass.draw(state, viewer, self._table, ground, surface)
 
@@ -176,10 +209,24 @@ class ImpostorRenderer:
         ground : Ground
             The plane on which the caller has drawn a ground.
         """
-        with preserved_state(self._ctx) as state:
-            viewer = Viewer.from_matrices(clip_from_view, view_from_world, state.viewport)
+        check_type("ground", ground, Ground)
+        with self._frame(clip_from_view, view_from_world) as (state, viewer):
             fans = [batch.instances for batch in self._batches]
             self._shadows.draw(state, fans, self._meshes, viewer, self.lights, self.ambient, ground)
+
+    @contextmanager
+    def _frame(self, clip_from_view: ArrayLike, view_from_world: ArrayLike) -> Iterator[tuple[CallerState, Viewer]]:
+        """The caller's state, put back at the end, and the viewer; what may have become impossible is refused."""
+        self._check_in_use()
+        check_lights(self._lights)
+        for mesh in self._meshes:
+            numbers(mesh.buffers.model.name, "world_from_model", mesh.world_from_model, (4, 4))
+        with preserved_state(self._ctx) as state:
+            yield state, Viewer.from_matrices(clip_from_view, view_from_world, state.viewport)
+
+    def _check_in_use(self) -> None:
+        if self._released:
+            raise GpuError("ImpostorRenderer", "has been released; expected one that is in use")
 
     def _update_lights(self, output: str) -> None:
         if output not in OUTPUTS:
@@ -202,5 +249,16 @@ class ImpostorRenderer:
             buffers.release()
         self._batches.clear()
         self._meshes.clear()
+        self._released = True
         for part in (self._impostors, self._mesh_pass, self._ground_pass, self._shadows, self._table):
             part.release()
+
+
+def _check_surface(surface: GroundSurface) -> None:
+    check_type("surface", surface, GroundSurface)
+    texture = surface.texture
+    if texture is None:
+        return
+    check_type("ground texture", texture, np.ndarray)
+    if texture.dtype != np.uint8 or texture.ndim != 3 or texture.shape[2] != 4 or not texture.size:
+        raise SettingsError("ground texture", f"{texture.shape} {texture.dtype}; expected (H, W, 4) uint8")

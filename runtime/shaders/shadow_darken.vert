@@ -1,7 +1,11 @@
 #version 330
-uniform mat4 clip_from_world;
-in vec3 corner;
+// A cell of the picture, laid on the ground plane.
+uniform vec2 cell_size;     // in clip space
+uniform vec3 ground_depth;  // of the ground at x, y in clip space: linear
+in vec2 corner;             // 0..1
+in vec2 cell;
 
 void main() {
-    gl_Position = clip_from_world * vec4(corner, 1.0);
+    vec2 at = (cell + corner) * cell_size - 1.0;
+    gl_Position = vec4(at, dot(ground_depth, vec3(at, 1.0)), 1.0);
 }

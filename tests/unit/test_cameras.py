@@ -117,13 +117,13 @@ def test_spheres_that_touch_the_picture_are_seen():
 @pytest.mark.parametrize(
     ("matrix", "problem"),
     [
-        (np.eye(3), "shape (3, 3)"),
-        (np.full((4, 4), np.nan), "shape (4, 4); expected a (4, 4) matrix of finite numbers"),
-        (np.zeros((4, 4)), "its determinant is 0"),
+        (np.eye(3), "of shape (3, 3); expected (4, 4)"),
+        (np.full((4, 4), np.nan), "with a number that is not finite"),
+        (np.diag([1.0, 0, 1, 1]), "@ view_from_world has no inverse"),
     ],
 )
 def test_matrices_that_are_no_camera_are_refused(matrix, problem):
     for name, pair in (("clip_from_view", (matrix, np.eye(4))), ("view_from_world", (np.eye(4), matrix))):
         with pytest.raises(SettingsError) as caught:
             Viewer.from_matrices(*pair, VIEWPORT)
-        assert str(caught.value).startswith(f"{name}: {problem}")
+        assert str(caught.value).startswith("camera: ") and problem in str(caught.value)

@@ -48,16 +48,64 @@ def test_no_copies_at_all(positions):
         ((np.zeros((4, 2)),), "positions of shape (4, 2); expected (N, 3)"),
         ((np.zeros((4, 3)), np.zeros(3)), "yaws of shape (3,); expected (4,)"),
         ((np.zeros((4, 3)), 0, np.zeros((4, 1))), "scales of shape (4, 1); expected (4,)"),
-        (((0, np.nan, 0),), "positions hold a number that is not finite"),
-        (((0, 0, 0), np.inf), "yaws hold a number that is not finite"),
+        (((0, np.nan, 0),), "positions with a number that is not finite"),
+        (((0, 0, 0), np.inf), "yaws with a number that is not finite"),
         (((0, 0, 0), 0, 0), "scales go down to 0; expected more than 0"),
         (((0, 0, 0), 0, -2), "scales go down to -2"),
+        (("here",), "positions is a str; expected numbers of shape (N, 3)"),
+        (([[0, 0, 0], [1]],), "positions is a list; expected numbers"),
     ],
 )
 def test_impossible_places_are_refused(arguments, problem):
     with pytest.raises(SettingsError) as caught:
         Instances(FAN, *arguments)
     assert str(caught.value).startswith(f"solids: {problem}")
+
+
+def test_what_replaces_an_array_is_written_into_it():
+    copies = Instances(FAN, np.zeros((3, 3)))
+    held = copies.positions, copies.yaws, copies.scales, copies.visible
+    copies.positions, copies.yaws = [[0, 0, 1], [0, 0, 2], [0, 0, 3]], 0.5
+    copies.scales, copies.visible = (1, 2, 3), [True, False, True]
+    copies.positions += 1
+    for array, now in zip(held, (copies.positions, copies.yaws, copies.scales, copies.visible), strict=True):
+        assert array is now
+    assert copies.positions[:, 2].tolist() == [2, 3, 4]
+    assert (copies.yaws.tolist(), copies.scales.tolist()) == ([0.5] * 3, [1, 2, 3])
+    assert (copies.visible.dtype, copies.visible.tolist()) == (bool, [True, False, True])
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "problem"),
+    [
+        ("positions", np.zeros((2, 3)), "positions of shape (2, 3); expected (3, 3)"),
+        ("positions", [[np.nan, 0, 0]] * 3, "positions with a number that is not finite"),
+        ("positions", "there", "positions is a str; expected numbers of shape (3, 3)"),
+        ("yaws", [0, 1], "yaws of shape (2,); expected (3,) or ()"),
+        ("yaws", np.inf, "yaws with a number that is not finite"),
+        ("scales", [1, 0, 1], "scales go down to 0; expected more than 0"),
+        ("visible", [True], "visible of shape (1,); expected (3,) or ()"),
+    ],
+)
+def test_what_cannot_replace_an_array_is_refused_and_changes_nothing(name, values, problem):
+    copies = Instances(FAN, np.ones((3, 3)), 0.25, 2.0)
+    before = getattr(copies, name).copy()
+    with pytest.raises(SettingsError) as caught:
+        setattr(copies, name, values)
+    assert str(caught.value).startswith(f"solids: {problem}")
+    np.testing.assert_array_equal(getattr(copies, name), before)
+
+
+def test_copies_whose_numbers_became_impossible_are_left_out():
+    copies = Instances(FAN, np.zeros((6, 3)))
+    copies.positions[0, 1], copies.yaws[1], copies.scales[2:5] = np.nan, np.inf, (np.inf, 0, -1)
+    assert quads_toward(copies, np.array([0, 0, 1.0, 0])).index.tolist() == [5]
+
+
+@pytest.mark.parametrize("gloss", [0.3, "shiny"])
+def test_only_a_gloss_is_one(gloss):
+    with pytest.raises(SettingsError, match=r"^gloss: a \w+; expected a Gloss$"):
+        Instances(FAN, gloss=gloss)
 
 
 def test_a_turned_copy_shows_the_view_that_its_turn_brings_round():

@@ -73,13 +73,19 @@ def light_at(azimuth_deg, elevation_deg, color=(1, 1, 1)):
 
 
 def marked(renderer):
-    """Where the first light's shadow lies, before its edge is made smooth: (SIZE, SIZE) bool."""
-    pixels = np.frombuffer(renderer._shadows._marks.read(), np.uint8)
-    return pixels.reshape(SIZE, SIZE, 4)[::-1, :, 0] > 0
+    """Which corners of pixels the first light's shadow holds, (SIZE + 1, SIZE + 1) bool."""
+    marks = renderer._shadows._marks
+    pixels = np.frombuffer(marks.read(alignment=1), np.uint8)
+    return pixels.reshape(SIZE + 1, SIZE + 1, marks.components)[::-1, :, 0] > 0
+
+
+def on_pixels(corners):
+    """Pixels all of whose corners are in the mask."""
+    return corners[1:, 1:] & corners[1:, :-1] & corners[:-1, 1:] & corners[:-1, :-1]
 
 
 def expected_mask(fan, place, matrices, light, plane):
-    """The strips' triangles, projected by NumPy and filled pixel by pixel."""
+    """The strips' triangles, projected by NumPy and filled corner of pixel by corner: (SIZE + 1, SIZE + 1) bool."""
     instances = Instances(fan, *place)
     eye = Viewer.from_matrices(*matrices, (0, 0, SIZE, SIZE)).eye
     quad = quads_toward(instances, eye)
@@ -97,8 +103,8 @@ def expected_mask(fan, place, matrices, light, plane):
         ground=plane,
     )
     clip = shadow @ (matrices[0] @ matrices[1]).T
-    pixels = (clip[:, :2] / clip[:, 3:] * (1, -1) + 1) / 2 * SIZE - 0.5
-    mask = np.zeros((SIZE, SIZE), bool)
+    pixels = (clip[:, :2] / clip[:, 3:] * (1, -1) + 1) / 2 * SIZE
+    mask = np.zeros((SIZE + 1, SIZE + 1), bool)
     for corners in pixels[strips.triangles()]:
         mask[polygon(corners[:, 1], corners[:, 0], mask.shape)] = True
     return mask
@@ -115,12 +121,14 @@ class TestShape:
         expected = expected_mask(fan, place, VIEWERS[viewer], light, plane)
         pictures = ground(VIEWERS[viewer], [light], plane)
         visible = pictures[1][..., 0] > 0  # up to the horizon
-        found, expected = marked(renderer) & visible, expected & visible
+        under_horizon = np.pad(visible, ((1, 0), (0, 1)))  # corners, where the pixel above shows the ground
+        found, expected = marked(renderer) & under_horizon, expected & under_horizon
         assert expected.sum() > 100
         # What lies on a triangle's edge may fall on either side.
         assert iou(found, expected) > (0.99 if expected.sum() > 2000 else 0.95)
-        assert not (shadowed(pictures) & ~binary_dilation(found)).any()
-        assert not (binary_erosion(found, np.ones((3, 3)), border_value=1) & ~shadowed(pictures)).any()
+        inside, touched = on_pixels(found) & visible, ~on_pixels(~found)
+        assert not (shadowed(pictures) & ~touched).any()
+        assert not (inside & ~shadowed(pictures)).any()
 
     @pytest.mark.parametrize("matrices", [filling(1.2, 0.1, 0.5, (0.5, 0, -0.2)), looking((1, 2, 4), (1, 0, -0.5), 30)])
     def test_a_picture_full_of_shadow(self, renderer, ground, matrices):
@@ -147,10 +155,12 @@ class TestShape:
 
     def test_a_mesh_shadow_is_the_mesh_pressed_along_the_light(self, renderer, ground):
         """A unit cube under light from +X at 45 degrees: the map is the square and its copy one metre toward -X."""
-        renderer.add_mesh(solid_model(Box((-0.5, 0, -0.5), (0.5, 1, 0.5))), placed((0.25, 0, 0)))
-        found = shadowed(ground(filling(2.0, 0.0, np.pi / 2), [light_at(90, 45)]))
-        x = (np.arange(SIZE) + 0.5) / SIZE * 4 - 2
-        expected = (np.abs(x) < 0.5)[:, None] & ((x > -1.25) & (x < 0.75))[None, :]
+        pixel = 4 / SIZE
+        shift = pixel / 4  # edges within pixels, half of which is then in the shadow
+        renderer.add_mesh(solid_model(Box((-0.5, 0, -0.5), (0.5, 1, 0.5))), placed((0.25 + shift, 0, shift)))
+        found = shadowed(ground(filling(2.0, 0.0, np.pi / 2), [light_at(90, 45)]), 0.2)
+        x = (np.arange(SIZE) + 0.5) / SIZE * 4 - 2 - shift
+        expected = (np.abs(x) < 0.5 + pixel / 2)[:, None] & ((x > -1.25 - pixel / 2) & (x < 0.75 + pixel / 2))[None, :]
         assert iou(found, expected) > 0.98
 
     @pytest.mark.parametrize("height", [0.0, 2.0])
@@ -381,3 +391,70 @@ class TestInTheScene:
             alone |= shadowed(ground(matrices, [light]))
             renderer.remove(tree)
         assert iou(together, alone) > 0.95
+
+
+class TestFrameByFrame:
+    """What lasts from one frame to the next never shows in the picture."""
+
+    MATRICES = filling(2.4, 0.3, 0.5, (0.8, 0.5, -0.6))
+
+    def test_a_still_frame_is_drawn_like_the_first(self, renderer, ground):
+        renderer.add(FAN)
+        first, _ = ground(self.MATRICES, [light_at(-50, 35)])
+        again, bare = ground(self.MATRICES, [light_at(-50, 35)])
+        np.testing.assert_array_equal(first, again)
+        assert (again != bare).any()
+
+    @pytest.mark.parametrize(
+        "change", ["position", "yaw", "scale", "hidden", "light", "plane", "mesh", "viewer", "strength"]
+    )
+    def test_every_change_shows(self, renderer, ground, change):
+        """The frame after it is the one that a new renderer, which has nothing kept, would draw."""
+        trees, mesh = (
+            renderer.add(FAN, [(0, 0, 0), (1, 0, 0)]),
+            renderer.add_mesh(solid_model(Sphere((-1, 0.5, 0), 0.4))),
+        )
+        scene = {"matrices": self.MATRICES, "lights": [light_at(-50, 35)], "plane": LEVEL}
+        before, _ = ground(**scene)
+        if change == "position":
+            trees.positions[0, 2] += 0.5
+        elif change == "yaw":
+            trees.yaws[1] += 0.7
+        elif change == "scale":
+            trees.scales[0] *= 0.5
+        elif change == "hidden":
+            trees.visible[0] = False
+        elif change == "mesh":
+            mesh.world_from_model[1, 3] += 0.4
+        elif change == "plane":
+            scene["plane"] = Ground((0, 1, 0), -0.3)
+        elif change == "viewer":
+            scene["matrices"] = filling(2.4, 0.4, 0.5, (0.8, 0.5, -0.6))
+        elif change == "strength":
+            scene["lights"] = [light_at(-50, 35, (0.2, 0.2, 0.2))]
+            scene["ambient"] = 0.5
+        else:
+            scene["lights"] = [light_at(-20, 35)]
+        after, _ = ground(**scene)
+        renderer._shadows._frame = None
+        fresh, _ = ground(**scene)
+        assert (after != before).any()
+        np.testing.assert_array_equal(after, fresh)
+
+
+class TestSmallOnTheScreen:
+    @pytest.mark.parametrize(("half", "part"), [(5.0, 0.05), (10.0, 0.12), (20.0, 0.15)])
+    def test_strips_of_coarser_silhouettes_cast_the_same_shadow(self, renderer, ground, half, part, monkeypatch):
+        """Objects 30, 15 and 8 pixels high; most of what differs is a part of a pixel at the outline."""
+        fan = solid_fan(*SOLIDS, views=16, elevation_deg=15, size=256)
+        renderer.add(fan, [(x, 0, z) for x in (-4, 0, 4) for z in (-4, 0, 4)])
+        scene = filling(half, 0.3, 0.6), [light_at(-50, 45)]
+        coarse, bare = (picture[..., 0].astype(float) for picture in ground(*scene))
+        levels = {level for _, _, level in renderer._shadows._strips._held}
+        monkeypatch.setattr("runtime.shadow_strips.LARGEST_TEXEL", 1e-6)
+        renderer._shadows._frame = None
+        fine = ground(*scene)[0][..., 0].astype(float)
+        assert levels and 0 not in levels
+        shade = (bare - fine).sum()
+        assert (bare - coarse).sum() == pytest.approx(shade, rel=part)
+        assert np.abs(fine - coarse).sum() < 0.25 * shade

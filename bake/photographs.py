@@ -1,0 +1,230 @@
+"""Photographs of one object under many lights: opened and checked, then decoded a batch ahead in worker threads."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from PIL import Image
+
+from impostor.errors import ImpostorError
+
+FORMATS = ("JPEG", "PNG", "TIFF", "TGA", "BMP", "PPM", "WEBP")
+MAX_TEXELS = 80_000_000  # a fit holds 72 bytes a texel: what a header may ask for has an end
+BAND = 64  # rows copied at a time, measured
+ORIENTATION = 0x0112  # the EXIF tag
+TURNS = {
+    2: Image.Transpose.FLIP_LEFT_RIGHT,
+    3: Image.Transpose.ROTATE_180,
+    4: Image.Transpose.FLIP_TOP_BOTTOM,
+    5: Image.Transpose.TRANSPOSE,
+    6: Image.Transpose.ROTATE_270,
+    7: Image.Transpose.TRANSVERSE,
+    8: Image.Transpose.ROTATE_90,
+}
+SIDEWAYS = {TURNS[tag] for tag in (5, 6, 7, 8)}
+GRAY_MODES = ("1", "L", "LA", "La")
+DEEP_MODES = ("I;16", "I;16B", "I;16L", "I;16N", "I")
+
+
+class PhotographError(ImpostorError):
+    """A photograph that cannot be decoded, or that does not fit to the others of its capture set."""
+
+
+@dataclass(frozen=True)
+class Photographs:
+    """The photographs of a capture set, not yet decoded.
+
+    Parameters
+    ----------
+    paths : tuple of Path
+    size : tuple of int
+        Width and height, the same for all, after `turn`.
+    channels : {1, 3}
+        1 where every photograph is gray.
+    dtype : {uint8, uint16}
+    turn : Image.Transpose, optional
+        What turns the stored pixels upright.
+    """
+
+    paths: tuple[Path, ...]
+    size: tuple[int, int]
+    channels: int
+    dtype: np.dtype[Any]
+    turn: Image.Transpose | None = None
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+    @property
+    def white(self) -> int:
+        """The stored value of white."""
+        return int(np.iinfo(self.dtype).max)
+
+    @property
+    def values(self) -> int:
+        """Values in one photograph: texels times channels."""
+        return self.size[0] * self.size[1] * self.channels
+
+    def decode(self, index: int, out: NDArray[Any] | None = None) -> NDArray[Any]:
+        """The pixels of one photograph.
+
+        Parameters
+        ----------
+        index : int
+        out : ndarray of shape (H, W, C), uint8 or uint16, optional
+            Where to put them. Memory that is used again costs much less than new memory.
+
+        Returns
+        -------
+        ndarray of shape (H, W, C), uint8 or uint16
+            `out`, where it was given.
+
+        Raises
+        ------
+        PhotographError
+            The file is truncated or damaged.
+        """
+        path = self.paths[index]
+        if out is None:
+            out = np.empty((self.size[1], self.size[0], self.channels), self.dtype)
+        try:
+            with _opened(path) as image:
+                image.load()
+                self._copy(image if self.turn is None else image.transpose(self.turn), out)
+        except (PhotographError, MemoryError):
+            raise
+        except Exception as error:  # Pillow promises no closed list of exceptions for a damaged image
+            raise PhotographError(path, f"cannot be decoded: {error or type(error).__name__}") from error
+        return out
+
+    def _copy(self, image: Image.Image, out: NDArray[Any]) -> None:
+        """Copy pixels, a band at a time: Pillow's way to NumPy makes two copies, which so stay in the cache."""
+        if image.size != self.size:
+            raise ValueError(f"is {image.size[0]}x{image.size[1]}, {self.size[0]}x{self.size[1]} in its header")
+        wanted = "L" if self.channels == 1 else "RGB"
+        width, height = image.size
+        for top in range(0, height, BAND):
+            band = image.crop((0, top, width, min(top + BAND, height)))
+            if band.mode in DEEP_MODES:
+                deep = np.asarray(band).astype(np.int64).clip(0, 65535)[..., None]
+                out[top : top + BAND] = deep if self.dtype == np.uint16 else deep >> 8
+                continue
+            pixels = np.asarray(band if band.mode == wanted else band.convert(wanted))
+            # 257 takes 255 to 65535: an 8-bit photograph among 16-bit ones.
+            scaled = pixels if self.dtype == np.uint8 else pixels.astype(np.uint16) * 257
+            out[top : top + BAND] = scaled.reshape(out[top : top + BAND].shape)
+
+
+def open_photographs(paths: Sequence[str | os.PathLike[str]]) -> Photographs:
+    """Read the headers of a capture set's photographs and check that they belong together.
+
+    The camera stood still, so the pixels of all photographs lie on one another as they are stored. The EXIF
+    orientation of the first is taken for all: a camera that looks straight down notes a different one at random.
+
+    Parameters
+    ----------
+    paths : sequence of path-like
+
+    Returns
+    -------
+    Photographs
+
+    Raises
+    ------
+    PhotographError
+        No photographs, a file that is missing or not an image, sizes that differ or are out of bounds.
+    """
+    if not paths:
+        raise PhotographError("capture set", "holds no photographs; expected at least one")
+    files = tuple(map(Path, paths))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Pillow warns of large images; here they are refused
+        headers = [_header(path) for path in files]
+    first, _, turn = headers[0]
+    for path, (size, mode, _) in zip(files, headers, strict=True):
+        if size != first:
+            raise PhotographError(
+                path, f"is {size[0]}x{size[1]}; expected {first[0]}x{first[1]} as {str(files[0].name)!r} is"
+            )
+        if mode == "F":
+            raise PhotographError(path, "holds floating-point pixels; expected 8 or 16 bits a channel")
+    if first[0] * first[1] > MAX_TEXELS:
+        raise PhotographError(files[0], f"is {first[0]}x{first[1]}; expected at most {MAX_TEXELS:,} pixels")
+    modes = {mode for _, mode, _ in headers}
+    gray = all(mode in (*GRAY_MODES, *DEEP_MODES) for mode in modes)
+    dtype = np.dtype(np.uint16 if gray and any(mode in DEEP_MODES for mode in modes) else np.uint8)
+    upright = (first[1], first[0]) if turn in SIDEWAYS else first
+    return Photographs(files, upright, 1 if gray else 3, dtype, turn)
+
+
+def decoded(
+    photographs: Photographs, pool: ThreadPoolExecutor, batch: int, indices: ArrayLike | None = None
+) -> Iterator[tuple[NDArray[np.int64], NDArray[Any]]]:
+    """Photographs in batches, the next of which is decoded while the caller works on this one.
+
+    Parameters
+    ----------
+    photographs : Photographs
+    pool : ThreadPoolExecutor
+        Where they are decoded; Pillow lets other threads run meanwhile.
+    batch : int
+        Photographs in a batch. Two batches are in memory at a time.
+    indices : array_like of int, optional
+        Which photographs; all if not given.
+
+    Yields
+    ------
+    indices : ndarray of shape (K,), int64
+    pixels : ndarray of shape (K, H, W, C), uint8 or uint16
+        Written over when the next but one is asked for.
+
+    Raises
+    ------
+    PhotographError
+        As `Photographs.decode`.
+    """
+    chosen = np.arange(len(photographs)) if indices is None else np.asarray(indices, np.int64)
+    batches = [chosen[start : start + batch] for start in range(0, len(chosen), batch)]
+    shape = (photographs.size[1], photographs.size[0], photographs.channels)
+    memory = [np.empty((len(part), *shape), photographs.dtype) for part in batches[:2]]
+
+    def begin(number: int) -> list[Future[NDArray[Any]]]:
+        slots = memory[number % 2]
+        return [pool.submit(photographs.decode, int(index), slots[k]) for k, index in enumerate(batches[number])]
+
+    ahead = begin(0) if batches else []
+    try:
+        for number, current in enumerate(batches):
+            for future in ahead:
+                future.result()
+            ahead = begin(number + 1) if number + 1 < len(batches) else []
+            yield current, memory[number % 2][: len(current)]
+    finally:
+        for future in ahead:
+            future.cancel()
+
+
+def _header(path: Path) -> tuple[tuple[int, int], str, Image.Transpose | None]:
+    with _opened(path) as image:
+        return image.size, image.mode, TURNS.get(image.getexif().get(ORIENTATION, 1))
+
+
+def _opened(path: Path) -> Image.Image:
+    try:
+        return Image.open(path, formats=FORMATS)
+    except FileNotFoundError:
+        raise PhotographError(path, "does not exist; expected a photograph") from None
+    except OSError as error:
+        if error.errno is not None:
+            raise PhotographError(path, f"cannot be read: {error.strerror}") from error
+        raise PhotographError(path, f"is not an image; expected one of {', '.join(FORMATS)}") from error
+    except Exception as error:
+        raise PhotographError(path, f"cannot be read: {error or type(error).__name__}") from error

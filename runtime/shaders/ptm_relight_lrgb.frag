@@ -1,0 +1,12 @@
+#version 330
+// Writes the picture of a flat surface, texel by texel.
+#include "srgb.glsl"
+#include "ptm_lrgb.glsl"
+#include "ptm_curve.glsl"
+#include "ptm_terms.glsl"
+out vec4 color;
+
+void main() {
+    fetch_texel(ivec2(gl_FragCoord.xy));
+    color = vec4(srgb_from_linear(sum_of_terms()), 1.0);
+}

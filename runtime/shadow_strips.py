@@ -1,0 +1,183 @@
+"""Strips of fans' silhouettes on the GPU: steps 1 to 5 of the paper's shadow for every copy of a fan at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from impostor.fan import Fan
+from impostor.lighting import DirectionalLight
+from impostor.shadow_projection import LEVEL_CAMERA, Ground, ground_from_sight, strip_points
+from impostor.strips import silhouette_strips
+from impostor.views import rotation_about_y
+from runtime.gpu import load_program, set_uniforms
+from runtime.instances import Instances, Quads, Viewer, nearest_views, quads_toward
+from runtime.relight import InstanceBuffer
+from runtime.shadow_bounds import box_corners
+
+CASTER_DTYPE = np.dtype([("position_scale", "f4", (4,)), ("turn", "f4", (2,)), ("rows", "f4", (4, 4))])
+# Strips are cut from silhouettes whose texels are at most this large on screen.
+LARGEST_TEXEL = 1.0  # pixels
+COARSEST_SIDE = 16  # texels
+
+
+@dataclass(frozen=True, eq=False)
+class CastingFan:
+    """The copies of a fan that a viewer sees, as casters.
+
+    Parameters
+    ----------
+    instances : Instances
+    seen : Quads
+    records : ndarray, (N,) CASTER_DTYPE
+        Placement, and steps 3 to 5 in one matrix.
+    pixels_per_texel : ndarray, (N,) float64
+        Of the silhouette, on screen; 0 behind the camera.
+    """
+
+    instances: Instances
+    seen: Quads
+    records: NDArray[np.void]
+    pixels_per_texel: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, instances: Instances, viewer: Viewer, ground: Ground) -> CastingFan:
+        """Set up for a viewer."""
+        seen = quads_toward(instances, viewer.eye)
+        texel = 2 * instances.fan.views.radius.mean() / instances.fan.size * seen.scale
+        pixels = texel * viewer.pixels_per_metre(seen.origin)
+        return cls(instances, seen, _records(instances, seen, viewer, ground), pixels)
+
+    def __len__(self) -> int:
+        return len(self.seen)
+
+    def corners(self) -> NDArray[np.float64]:
+        """World-space corners (N, 8, 3) of the copies' bounding boxes."""
+        rotation = rotation_about_y(self.instances.yaws[self.seen.index])
+        turned = np.einsum("nij,kj->nki", rotation, box_corners(*self.instances.fan.bounds))
+        return self.instances.positions[self.seen.index][:, None] + self.seen.scale[:, None, None] * turned
+
+    def levels(self, stretch: float) -> NDArray[np.intp]:
+        """How often (N,) each silhouette may be halved, where the light lengthens shadows `stretch` times."""
+        size, most = self.instances.fan.size, 0
+        while size >> most + 1 >= COARSEST_SIDE and size % (1 << most + 1) == 0:
+            most += 1
+        # What is behind the camera may cast its shadow right before it.
+        on_screen = np.where(self.pixels_per_texel > 0, self.pixels_per_texel * stretch, LARGEST_TEXEL)
+        return np.clip(np.floor(np.log2(LARGEST_TEXEL / on_screen)), 0, most).astype(np.intp)
+
+
+class StripPass:
+    """Draws the shadows of casting fans into the bound framebuffer, one light at a time.
+
+    Parameters
+    ----------
+    ctx : moderngl.Context
+    """
+
+    def __init__(self, ctx: moderngl.Context):
+        self._ctx = ctx
+        self._program = load_program(ctx, "shadow_strips.vert", "shadow_strips.frag")
+        self._casters = InstanceBuffer(ctx, CASTER_DTYPE)
+        self._held: dict[tuple[int, int, int], tuple[Fan, moderngl.VertexArray | None, list[moderngl.Buffer]]] = {}
+
+    def begin(self, clip_from_world: NDArray[np.float64], light: DirectionalLight, ground: Ground) -> None:
+        """Say where the fans that follow cast to."""
+        set_uniforms(
+            self._program, clip_from_world=clip_from_world, ground=tuple(ground.plane), toward_light=light.toward
+        )
+
+    def draw(self, fan: CastingFan, chosen: NDArray[np.intp], light: DirectionalLight, ground: Ground) -> None:
+        """Draw the strips of some copies, one draw call for all that show the light the same view."""
+        toward = np.array(light.toward)
+        views, _ = nearest_views(fan.instances, np.append(toward, 0.0), fan.seen.index[chosen])
+        levels = fan.levels(1 / float(ground.normal @ toward))[chosen]
+        keys = views << 8 | levels
+        order = np.argsort(keys, kind="stable")
+        records = fan.records[chosen[order]]
+        keys, first, count = np.unique(keys[order], return_index=True, return_counts=True)
+        for key, start, number in zip(keys.tolist(), first.tolist(), count.tolist(), strict=True):
+            array = self._vertex_array(fan.instances.fan, key >> 8, key & 0xFF)
+            if array is not None:
+                self._casters.write(records[start : start + number])
+                array.render(moderngl.TRIANGLES, instances=number)
+
+    def _vertex_array(self, fan: Fan, view: int, level: int) -> moderngl.VertexArray | None:
+        """The strips of one view, cut when first asked for, or None where its silhouette is empty."""
+        key = (id(fan), view, level)
+        if key not in self._held:
+            silhouette, depth = _halved(fan.silhouette[view], fan.depth[view], level)
+            strips = silhouette_strips(silhouette)
+            triangles = strips.triangles()
+            array, buffers = None, []
+            if len(triangles):
+                points = strip_points(strips, fan.views[view], depth)
+                buffers = [self._ctx.buffer(points.astype("f4").tobytes()), self._ctx.buffer(triangles.tobytes())]
+                names = ("position_scale", "turn", "row0", "row1", "row2", "row3")
+                layout = [(buffers[0], "3f", "point"), (self._casters.buffer, "4f 2f 4f 4f 4f 4f/i", *names)]
+                array = self._ctx.vertex_array(self._program, layout, buffers[1])
+            self._held[key] = (fan, array, buffers)
+        return self._held[key][1]
+
+    def forget(self, fan: Fan) -> None:
+        """Free the strips of a fan."""
+        for key in [key for key, held in self._held.items() if held[0] is fan]:
+            _, array, buffers = self._held.pop(key)
+            for resource in (array, *buffers):
+                if resource is not None:
+                    resource.release()
+
+    def release(self) -> None:
+        """Free everything this pass made."""
+        for fan in {id(held[0]): held[0] for held in self._held.values()}.values():
+            self.forget(fan)
+        self._casters.release()
+        self._program.release()
+
+
+def _halved(
+    silhouette: NDArray[np.bool_], depth: NDArray[np.uint16], level: int
+) -> tuple[NDArray[np.bool_], NDArray[np.uint16]]:
+    """A silhouette and its depth with texels 2^level as large, at the depth of what they hold.
+
+    A texel counts from a quarter of it on: outlines run through texel centres, and so the area stays.
+    """
+    if level == 0:
+        return silhouette, depth
+    side = 1 << level
+    shape = (len(silhouette) >> level, side, len(silhouette) >> level, side)
+    covered = silhouette.reshape(shape).sum(axis=(1, 3))
+    total = np.where(silhouette, depth, np.uint16(0)).reshape(shape).sum(axis=(1, 3), dtype=np.uint64)
+    return 4 * covered > side * side, (total // np.maximum(covered, 1)).astype(np.uint16)
+
+
+def _records(instances: Instances, seen: Quads, viewer: Viewer, ground: Ground) -> NDArray[np.void]:
+    """Placement, and `shadow_projection.viewer_ground_from_ground`, of many instances at once."""
+    views = instances.fan.views
+    casters = np.zeros(len(seen), CASTER_DTYPE)
+    yaws = instances.yaws[seen.index]
+    casters["position_scale"][:, :3] = instances.positions[seen.index]
+    casters["position_scale"][:, 3] = seen.scale
+    casters["turn"] = np.stack([np.cos(yaws), np.sin(yaws)], axis=-1)
+    plane_from_world = np.zeros((len(seen), 3, 4))
+    plane_from_world[:, :, :3] = seen.basis
+    plane_from_world[:, :, 3] = -np.einsum("nij,nj->ni", seen.basis, seen.origin)
+    if np.isfinite(views.distance):
+        eye_distance = views.distance * seen.scale
+        plane_from_world[:, :2] *= eye_distance[:, None, None]
+        plane_from_world[:, 2] *= -1
+        plane_from_world[:, 2, 3] += eye_distance
+    else:
+        plane_from_world[:, 2] = [0, 0, 0, 1]
+    world_from_plane = np.zeros((len(seen), 4, 3))
+    # Plane coordinates are world metres here, the quad's axes are for metres of the view.
+    right, up = seen.right / seen.scale[:, None], seen.up / seen.scale[:, None]
+    world_from_plane[:, :3] = np.stack([right, up, seen.center], axis=-1)
+    world_from_plane[:, 3, 2] = 1
+    level = np.abs(seen.basis[:, 2] @ ground.normal) < LEVEL_CAMERA
+    casters["rows"] = ground_from_sight(viewer.eye, ground) @ world_from_plane @ plane_from_world
+    casters["rows"][level] = np.eye(4)
+    return casters
