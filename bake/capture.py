@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bake.resolve import CapturedView
+from bake.settings import SAMPLES
 from bake.vertices import vertex_records
 from impostor.errors import GpuError, SettingsError
 from impostor.model import Material, Model, Primitive
@@ -43,7 +44,6 @@ except Exception as problem:
     raise GpuError("OpenGL", f"cannot be loaded ({reason}); {INSTALL_HINT}") from problem
 
 SHADERS = Path(__file__).parent / "shaders"
-SAMPLES = (1, 2, 4)
 
 
 class Capture:
@@ -86,7 +86,7 @@ class Capture:
             limit = min(int(GL.glGetIntegerv(name)) for name in (GL.GL_MAX_TEXTURE_SIZE, GL.GL_MAX_RENDERBUFFER_SIZE))
         if size * self.samples > limit:
             self.release()
-            raise SettingsError("--size", f"{size} texels of {self.samples} samples; expected at most {limit} samples")
+            raise SettingsError("size", f"{size} texels of {self.samples} samples; expected at most {limit} samples")
 
     def view(self, view: View) -> CapturedView:
         """Every layer of one view.

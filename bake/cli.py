@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from impostor.cli import Force, Quiet, UpAxis, check_name, progress_bar
+from impostor.cli import AllowMissing, Force, Quiet, UpAxis, as_flags, check_name, progress_bar
 
 
 def register(app: typer.Typer) -> None:
@@ -17,11 +17,12 @@ def register(app: typer.Typer) -> None:
     app.command("bake")(bake)
 
 
+@as_flags("views", "elevation", "layout", "size", "samples", distance="--perspective")
 def bake(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="GLB, glTF, OBJ, PLY, STL, OFF, 3MF or COLLADA.")],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.fan")],
     views: Annotated[int, typer.Option(help="Number of cameras.")] = 96,
-    elevation: Annotated[float, typer.Option(metavar="DEG", help="Of a ring of cameras.")] = 15.0,
+    elevation: Annotated[float | None, typer.Option(metavar="DEG", help="Of a ring of cameras; 15.")] = None,
     layout: Annotated[str, typer.Option(metavar="ring|hemisphere|sphere")] = "ring",
     size: Annotated[int, typer.Option(metavar="TEXELS", help="Side of a tile.")] = 256,
     perspective: Annotated[
@@ -30,7 +31,8 @@ def bake(
     samples: Annotated[
         int | None, typer.Option(metavar="1|2|4", help="Samples along a texel's side; 4 for textures, else 2.")
     ] = None,
-    up: UpAxis = "y",
+    up: UpAxis = None,
+    allow_missing_textures: AllowMissing = False,
     picture: Annotated[
         Path | None, typer.Option(metavar="PNG", help="Also write the layers of eight views as a picture.")
     ] = None,
@@ -38,27 +40,23 @@ def bake(
     quiet: Quiet = False,
 ) -> None:
     """Bake a model into a fan: colour, depth, normal codes and silhouette from a circle of cameras."""
+    from bake.settings import camera_bases
     from impostor.errors import SettingsError
-    from impostor.fan import MAX_SIZE, MIN_SIZE
-    from impostor.views import layout_bases
 
     started = time.monotonic()
     # All that can be refused without the model is refused before it is loaded.
     check_name(output, ".fan", force)
     if picture is not None:
         check_name(picture, ".png", force)
-    layout_bases(layout, views, math.radians(elevation))
-    if not MIN_SIZE <= size <= MAX_SIZE:
-        raise SettingsError("--size", f"{size} texels; expected {MIN_SIZE} to {MAX_SIZE}")
-    if perspective is not None and not 0 < perspective < math.inf:
-        raise SettingsError("--perspective", f"{perspective:g} m; expected a distance above 0")
-    if samples not in (None, 1, 2, 4):
-        raise SettingsError("--samples", f"{samples}; expected 1, 2 or 4")
+    if perspective == math.inf:
+        raise SettingsError("--perspective", "inf m; expected a distance, or none for an orthographic camera")
+    distance = math.inf if perspective is None else perspective
+    camera_bases(views, elevation, layout, size, distance, samples)
 
     from impostor.files.fan_file import write_fan
     from impostor.model import load_model
 
-    mesh = load_model(model, up=up)
+    mesh = load_model(model, up=up or "y", allow_missing_textures=allow_missing_textures)
     from bake.fan import bake_fan
 
     with progress_bar(f"baking {model.name}", quiet) as progress:
@@ -68,9 +66,9 @@ def bake(
             elevation_deg=elevation,
             layout=layout,
             size=size,
-            distance=math.inf if perspective is None else perspective,
+            distance=distance,
             samples=samples,
-            up=up,
+            up=up or "y",
             progress=progress,
         )
     written = write_fan(output, fan, force)

@@ -6,15 +6,12 @@ photographs: the lights' Gram matrix says how far apart two sets of coefficients
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from numpy.typing import NDArray
 
 from bake.design import Design
 from impostor.ptm.polynomials import RGB_FROM_YCRCB, TERMS
 
-Space = Literal["ycbcr", "principal"]
 TYPICAL_LUMINANCE = 0.5  # root mean square over the lights, of every texel whose colour leaves room for it
 DARKEST = np.float32(1e-6)  # a texel that is black under all lights
 TINY = np.float32(1e-20)

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from bake.capture import Capture
 from bake.resolve import CapturedView, TileLayers, dilate, resolve
+from bake.settings import RING_ELEVATION_DEG, camera_bases
 from impostor.errors import SettingsError
-from impostor.fan import DEPTH_CODES, MAX_SIZE, MIN_SIZE, Fan
+from impostor.fan import DEPTH_CODES, Fan
 from impostor.model import Model
 from impostor.normal_code import mip_codes
-from impostor.views import Views, frame, layout_bases
+from impostor.views import Views, frame
 
 DILATION = 2  # texels past the silhouette: what bilinear filtering of a view can reach
 VIEWS_AT_ONCE = 16  # exact normals are held for so many views only
@@ -31,7 +32,7 @@ def bake_fan(
     model: Model,
     *,
     views: int = 96,
-    elevation_deg: float = 15.0,
+    elevation_deg: float | None = None,
     layout: str = "ring",
     size: int = 256,
     distance: float = np.inf,
@@ -46,8 +47,8 @@ def bake_fan(
     model : Model
     views : int
         Number of cameras.
-    elevation_deg : float
-        Of a ring of cameras, in degrees.
+    elevation_deg : float, optional
+        Of a ring of cameras, in degrees; 15 if not given. Other layouts take none.
     layout : {"ring", "hemisphere", "sphere"}
     size : int
         Side of a tile in texels.
@@ -75,13 +76,11 @@ def bake_fan(
     ----------
     Dinh, Metoyer, Turk, figures 1 and 3.
     """
-    if not MIN_SIZE <= size <= MAX_SIZE:
-        raise SettingsError("--size", f"{size} texels; expected {MIN_SIZE} to {MAX_SIZE}")
-    bases = layout_bases(layout, views, np.radians(elevation_deg))
+    bases = camera_bases(views, elevation_deg, layout, size, distance, samples)
     cameras = frame(bases, np.concatenate([part.positions for part in model.primitives]), size, distance)
     if FARTHEST * model.radius < distance < np.inf:
         most = f"at most {FARTHEST * model.radius:.4g} m for this object, or none for an orthographic camera"
-        raise SettingsError("--perspective", f"{distance:g} m; expected {most}")
+        raise SettingsError("distance", f"{distance:g} m; expected {most}")
     layers = _Layers(views, size)
     # Resolving and coding one view overlaps with drawing the next.
     with Capture(model, size, samples) as capture, ThreadPoolExecutor(1) as worker:
@@ -95,6 +94,8 @@ def bake_fan(
         for future in pending:
             future.result()
         samples = capture.samples
+    if layout == "ring" and elevation_deg is None:
+        elevation_deg = RING_ELEVATION_DEG
     settings = {
         "views": views,
         "elevation": elevation_deg,
@@ -143,7 +144,7 @@ class _Layers:
         """All of it, as a fan."""
         if not self._color[..., 3].any():
             found = "the object covers no texel of any view"
-            raise SettingsError("--size", f"{found}; expected larger tiles, or cameras that do not see it edge-on")
+            raise SettingsError("size", f"{found}; expected larger tiles, or cameras that do not see it edge-on")
         silhouette: NDArray[np.bool_] = self._color[..., 3] >= 128
         source = {"name": model.name, "sha256": model.source_hash}
         views = replace(views, plane=self._planes(views, silhouette))

@@ -6,13 +6,12 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bake.color_models import (
-    Space,
     inverse,
     light_spread,
     luma_and_chroma,
@@ -23,12 +22,13 @@ from bake.color_models import (
 from bake.design import ALL_TERMS, Design, make_design
 from bake.photographs import Photographs, decoded
 from impostor.errors import SettingsError
+from impostor.files.lp_file import CaptureSet
 from impostor.ptm.polynomials import TERMS, Curve, Parameters, Polynomials
 from impostor.srgb import linear_from_srgb
 
-Format = Literal["lrgb", "rgb", "lum"]
 FORMATS = ("lrgb", "rgb", "lum")
 SPACES = ("ycbcr", "principal")
+LOWEST = -0.02  # a light this little below the horizon is one on it, measured badly
 BATCH = 12  # photographs between two visits to the accumulators; two batches weigh as much as the accumulators
 BLOCK = 8192  # values of a photograph: a batch's block in floats stays in a core's second-level cache
 SLICES_A_WORKER = 4  # so that workers end together
@@ -38,11 +38,11 @@ def fit_ptm(
     photographs: Photographs,
     parameters: ArrayLike,
     *,
-    format: Format = "lrgb",
+    format: str = "lrgb",
     curve: Curve = "srgb",
     meaning: Parameters = "light",
     terms: tuple[int, ...] = ALL_TERMS,
-    space: Space = "ycbcr",
+    space: str = "ycbcr",
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Polynomials:
@@ -97,6 +97,21 @@ def fit_ptm(
     with ThreadPoolExecutor(worker_count(workers)) as pool:
         planes = accumulate(photographs, design, curve, pool, progress)
         return assemble(planes, photographs.size, design, format, space, curve, meaning, pool)
+
+
+def light_parameters(capture: CaptureSet) -> NDArray[np.float64]:
+    """(lu, lv) of a capture set's lights: (N, 2), float64.
+
+    Raises
+    ------
+    SettingsError
+        A light stands behind the object, where the same (lu, lv) means another light.
+    """
+    behind = np.flatnonzero(capture.directions[:, 2] < LOWEST)
+    if len(behind):
+        name = capture.photographs[behind[0]].name if capture.photographs else f"light {behind[0] + 1}"
+        raise SettingsError(name, f"light's z is {capture.directions[behind[0], 2]:.3g}; expected above 0, in front")
+    return capture.directions[:, :2]
 
 
 def check_choices(format: str, curve: str, space: str) -> None:
@@ -202,8 +217,8 @@ def assemble(
     planes: NDArray[np.float32],
     size: tuple[int, int],
     design: Design,
-    format: Format,
-    space: Space,
+    format: str,
+    space: str,
     curve: Curve,
     meaning: Parameters,
     pool: ThreadPoolExecutor,
@@ -233,7 +248,7 @@ def assemble(
         planes = np.broadcast_to(planes, (*planes.shape[:2], 3))
     if format == "rgb":
         return make(_coefficients(planes, size))
-    parts = slices(planes.shape[1], -(-planes.shape[1] // BLOCK))
+    parts = slices(planes.shape[1], -(-planes.shape[1] // (2 * BLOCK)))
     one = np.empty(planes.shape[:2], np.float32)
     if format == "lrgb":
         color = np.empty((planes.shape[1], 3), np.float32)

@@ -23,14 +23,15 @@ def run(bench: Workbench) -> Table:
         field = Field(bench.ctx, bench.fan("dragon"), count, HEIGHTS.get(count, 10))
         field.impostors()
         impostors = field.renderer._impostors
-        array, impostors._array = impostors._array, _NoArray()  # type: ignore[assignment]
+        arrays = impostors._rectangles, impostors._octagons, impostors._shape
+        impostors._rectangles = impostors._octagons = impostors._shape = _NoArray()  # type: ignore[assignment]
         field.target.framebuffer.use()
         jobs = (
             lambda field=field: field.renderer.draw(*field.matrices),
             lambda field=field: field.renderer.draw(*field.shifted_matrices()),
         )
         still, moving = (alternate(job, ctx=bench.ctx).median(0) for job in jobs)
-        impostors._array = array
+        impostors._rectangles, impostors._octagons, impostors._shape = arrays
         values = {"instances": count, "still_ms": still * 1e3, "moving_ms": moving * 1e3}
         table.rows.append(Row(str(count), f"{count:,} instance{'s' * (count > 1)}", values))
         field.release()

@@ -64,7 +64,7 @@ class PlainQuads:
         program = self._ctx.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT.replace("FETCH", fetch))
         clip_from_world, size = self._field.viewer.clip_from_world, self._texture.size
         set_uniforms(program, clip_from_world=clip_from_world, texture_size=size, alpha_cutoff=ALPHA_CUTOFF)
-        layout = "3f 3f 3f 12x 4f 3f 16x/i"
+        layout = "3f 3f 3f 12x 4f 16x 3f 16x/i"
         names = ("center", "right", "up", "rectangle", "place")
         return self._ctx.vertex_array(program, [(self._corners, "2f", "corner"), (self._records, layout, *names)])
 

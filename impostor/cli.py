@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 import typer
 
-from impostor.errors import ImpostorError, ModelWarning, OutputError, SettingsError
+from impostor.errors import ImpostorError, ImpostorWarning, OutputError, SettingsError
 from impostor.files.output import check_output
 
 INTERRUPTED = 130  # what Typer, and every shell, makes of Ctrl-C
@@ -29,9 +29,14 @@ def _known_axis(axis: str | None) -> str | None:
 Force = Annotated[bool, typer.Option("--force", help="Replace the output if it exists.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress bar and no summary.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-UpAxis = Annotated[str, typer.Option("--up", metavar="y|z", help="The model file's up axis.", callback=_known_axis)]
+UpAxis = Annotated[
+    str | None, typer.Option("--up", metavar="y|z", help="The model file's up axis; y.", callback=_known_axis)
+]
 BakedUpAxis = Annotated[
     str | None, typer.Option("--up", metavar="y|z", help="As the fan was baked if left out.", callback=_known_axis)
+]
+AllowMissing = Annotated[
+    bool, typer.Option("--allow-missing-textures", help="Draw the base colour where a texture's file is missing.")
 ]
 
 
@@ -98,11 +103,12 @@ def info(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A .fan, or a model.")],
     as_json: AsJson = False,
     picture: Annotated[Path | None, typer.Option(help="Write the layers of eight views as a PNG.")] = None,
-    up: UpAxis = "y",
+    up: UpAxis = None,
     force: Force = False,
 ) -> None:
     """Say what is in a fan or a model."""
     if file.suffix.lower() == ".fan":
+        refuse_with_fan(file, up=up)
         from impostor.summary import fan_summary
 
         summary = fan_summary(file)
@@ -117,7 +123,7 @@ def info(
 
         if picture is not None:
             raise SettingsError("--picture", f"{file} has no views; expected a .fan")
-        summary = model_summary(file, up)
+        summary = model_summary(file, up or "y")
     print_summary(summary, as_json)
 
 
@@ -162,6 +168,36 @@ def check_name(path: Path, suffix: str, force: bool) -> None:
     check_output(path, force)
 
 
+def refuse_with_fan(fan: Path, **flags: object) -> None:
+    """Refuse flags that say how a model file is read, where a fan is given that was made of one long ago."""
+    for name, value in flags.items():
+        if value:
+            raise SettingsError(_flag(name), f"given with {fan}; expected it with a model, not with a fan")
+
+
+@contextmanager
+def as_flags(*names: str, **flags: str) -> Iterator[None]:
+    """Say of a flag what a function says of the parameter that it became.
+
+    Parameters
+    ----------
+    *names : str
+        Parameters that are called as their flags.
+    **flags : str
+        The flags of others.
+    """
+    try:
+        yield
+    except SettingsError as error:
+        if error.where not in (*names, *flags):
+            raise
+        raise SettingsError(flags.get(error.where) or _flag(error.where), error.problem) from error
+
+
+def _flag(parameter: str) -> str:
+    return "--" + parameter.replace("_", "-")
+
+
 @contextmanager
 def progress_bar(label: str, quiet: bool = False) -> Iterator[Callable[[int, int], None]]:
     """A function to call with steps done and steps in all, which draws a bar on standard error.
@@ -185,7 +221,7 @@ def _held_warnings(notices: list[str]) -> Iterator[None]:
     """Gather what the user may not expect: it is said at the end, and a failed command says one line only."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        warnings.simplefilter("always", ModelWarning)
+        warnings.simplefilter("always", ImpostorWarning)
         warnings.showwarning = lambda message, *_, **__: notices.append(" ".join(str(message).split()))
         yield
 

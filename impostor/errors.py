@@ -45,8 +45,16 @@ class GpuError(ImpostorError):
     """No OpenGL context, a shader that does not compile, or an image the GPU cannot hold."""
 
 
-class ModelWarning(UserWarning):
+class ImpostorWarning(UserWarning):
+    """Something that was done, and is not what the user may expect."""
+
+
+class ModelWarning(ImpostorWarning):
     """Something in a model that was drawn differently from what its file asks for."""
+
+
+class ViewWarning(ImpostorWarning):
+    """A fan seen from where its views do not show it truly."""
 
 
 class PtmFileError(ImpostorError):

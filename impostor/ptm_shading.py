@@ -64,7 +64,7 @@ def shaded(
 
 def flat_terms(
     frame: ArrayLike, lights: Sequence[DirectionalLight], ambient: ArrayLike, curve: Curve
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The pictures whose sum a flat surface shows under directional lights, without those that are black.
 
     Parameters
@@ -79,18 +79,22 @@ def flat_terms(
     -------
     weights : ndarray, (N, 6) float64
         Their product with a texel's coefficients is its value.
-    strengths : ndarray, (N,) float64
-        Multiply the value, clipped to 0..1.
     colors : ndarray, (N, 3) float64
-        Multiply that in linear light.
+        Multiply the value, clipped to 0..1, in linear light.
     """
     toward = np.array([light.toward for light in lights], float).reshape(-1, 3) @ np.asarray(frame, float).T
-    color = np.array([light.color for light in lights], float).reshape(-1, 3)
+    color = np.array([light.color for light in lights], float).reshape(-1, 3) * drop_off(toward[:, 2])[:, None]
     around = ambient_gain(curve) * np.broadcast_to(np.asarray(ambient, float), (3,))
-    weights = np.vstack([basis(toward[:, 0], toward[:, 1]), AMBIENT_WEIGHTS])
-    strengths, colors = np.append(drop_off(toward[:, 2]), 1.0), np.vstack([color, around])
-    seen = (strengths > 0) & colors.any(axis=1)
-    return weights[seen], strengths[seen], colors[seen]
+    weights, colors = np.vstack([light_weights(toward), AMBIENT_WEIGHTS]), np.vstack([color, around])
+    seen = colors.any(axis=1)
+    return weights[seen], colors[seen]
+
+
+def light_weights(toward: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What unit directions (..., 3) give the coefficients, (..., 6); from below the surface as from the horizon."""
+    u, v, height = np.moveaxis(toward, -1, 0)
+    to_horizon = np.where(height < 0, np.maximum(np.hypot(u, v), 1e-6), 1)
+    return basis(u / to_horizon, v / to_horizon)
 
 
 def _linear(polynomials: Polynomials, values: NDArray[np.float32]) -> NDArray[np.float32]:

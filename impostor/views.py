@@ -234,16 +234,16 @@ def layout_bases(layout: str, count: int, elevation: float) -> NDArray[np.float6
         An unknown layout, a count or an elevation out of range.
     """
     if not 1 <= count <= MAX_VIEWS:
-        raise SettingsError("--views", f"{count} views; expected 1 to {MAX_VIEWS}")
+        raise SettingsError("views", f"{count} views; expected 1 to {MAX_VIEWS}")
     if layout == "ring":
         if not abs(elevation) < np.pi / 2:
-            raise SettingsError("--elevation", f"{np.degrees(elevation):g} degrees; expected between -90 and 90")
+            raise SettingsError("elevation", f"{np.degrees(elevation):g} degrees; expected between -90 and 90")
         return ring_bases(count, elevation)
     if layout == "hemisphere":
         return spiral_bases(count, lowest=0.0)
     if layout == "sphere":
         return spiral_bases(count, lowest=-1.0)
-    raise SettingsError("--layout", f"{layout!r}; expected one of {', '.join(LAYOUTS)}")
+    raise SettingsError("layout", f"{layout!r}; expected one of {', '.join(LAYOUTS)}")
 
 
 def frame(
@@ -278,7 +278,7 @@ def frame(
     points = _outermost(np.asarray(points, np.float32) - middle.astype(np.float32))
     reach = float(np.sqrt(np.einsum("ij,ij->i", points, points).max())) or 1.0
     if not distance > reach * 1.05:
-        raise SettingsError("--perspective", f"{distance:g} m; expected more than {reach * 1.05:.4g} m for this object")
+        raise SettingsError("distance", f"{distance:g} m; expected more than {reach * 1.05:.4g} m for this object")
     low, high = np.empty((2, len(bases), 3))
     for index, basis in enumerate(bases.astype(np.float32)):
         xyz = points @ basis.T

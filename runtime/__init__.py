@@ -1,9 +1,25 @@
 """Online: fans to pixels, in the caller's own moderngl context."""
 
-from runtime.cameras import Camera
-from runtime.gpu import make_context
-from runtime.grounds import GroundSurface
-from runtime.instances import Instances
-from runtime.renderer import ImpostorRenderer
+from typing import TYPE_CHECKING
+
+from impostor.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from runtime.cameras import Camera
+    from runtime.gpu import make_context
+    from runtime.grounds import GroundSurface
+    from runtime.instances import Instances
+    from runtime.renderer import ImpostorRenderer
 
 __all__ = ["Camera", "GroundSurface", "ImpostorRenderer", "Instances", "make_context"]
+
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "Camera": "cameras",
+        "GroundSurface": "grounds",
+        "ImpostorRenderer": "renderer",
+        "Instances": "instances",
+        "make_context": "gpu",
+    },
+)

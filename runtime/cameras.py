@@ -70,7 +70,7 @@ class Camera:
         if not np.linalg.norm(eye - target) > 0:
             raise SettingsError("camera", f"eye and target are both {eye.tolist()}; expected two different points")
         if not 0 < fov_deg < 180:
-            raise SettingsError("--fov", f"{fov_deg:g} degrees; expected more than 0 and less than 180")
+            raise SettingsError("fov_deg", f"{fov_deg:g} degrees; expected more than 0 and less than 180")
         if not 0 < near < far:
             raise SettingsError("camera", f"near {near:g} m, far {far:g} m; expected 0 < near < far")
         focal = 1 / np.tan(np.radians(fov_deg) / 2)

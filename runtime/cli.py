@@ -12,7 +12,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from impostor.cli import AsJson, BakedUpAxis, Force, Quiet, UpAxis, check_name, progress_bar
+from impostor.cli import (
+    AllowMissing,
+    AsJson,
+    BakedUpAxis,
+    Force,
+    Quiet,
+    UpAxis,
+    as_flags,
+    check_name,
+    progress_bar,
+    refuse_with_fan,
+)
 from impostor.errors import ModelWarning, SettingsError
 
 if TYPE_CHECKING:
@@ -38,6 +49,7 @@ def register(app: typer.Typer) -> None:
     app.command("compare")(compare)
 
 
+@as_flags("output", fov_deg="--fov")
 def render(
     subject: Annotated[Path, typer.Argument(metavar="FAN|MODEL")],
     output_file: Annotated[Path, typer.Option("-o", metavar="OUT.png")],
@@ -56,7 +68,8 @@ def render(
     background: Annotated[
         str | None, typer.Option(metavar="R,G,B|transparent", help="sRGB, 0 to 1, behind a lit picture.")
     ] = None,
-    up: UpAxis = "y",
+    up: UpAxis = None,
+    allow_missing_textures: AllowMissing = False,
     force: Force = False,
 ) -> None:
     """Draw a fan, or a mesh through the same camera and lights, as a PNG."""
@@ -79,12 +92,13 @@ def render(
     settings = PictureSettings(width, height, **options)
     viewpoint = _viewpoint(azimuth, elevation, eye, target, fov)
     check_name(output_file, ".png", force)
-    loaded = _load(subject, up)
+    loaded = _load(subject, up, allow_missing_textures)
     with _context() as ctx:
         pixels = draw_picture(ctx, loaded, viewpoint(loaded, width / height), settings)
     save_png(output_file, pixels, force=force)
 
 
+@as_flags(offsets_deg="--offsets")
 def compare(
     fan_file: Annotated[Path, typer.Argument(metavar="FAN")],
     model_file: Annotated[Path, typer.Argument(metavar="MODEL")],
@@ -100,6 +114,7 @@ def compare(
         Path | None, typer.Option(metavar="PNG", help="Write mesh, impostor and difference side by side.")
     ] = None,
     up: BakedUpAxis = None,
+    allow_missing_textures: AllowMissing = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -121,14 +136,15 @@ def compare(
     if picture is not None:
         check_name(picture, ".png", force)
     fan = read_fan(fan_file)
-    model = load_model(model_file, up=up or str(fan.settings.get("up", "y")))
+    axis = up or str(fan.settings.get("up", "y"))
+    model = load_model(model_file, up=axis, allow_missing_textures=allow_missing_textures)
     if fan.source.get("sha256") not in (None, model.source_hash):
         baked_from = f"{fan_file} was baked from another ({fan.source.get('name')})"
         warnings.warn(f"{model_file}: is not what the fan shows: {baked_from}", ModelWarning, stacklevel=1)
     with _context() as ctx, progress_bar("comparing", quiet) as progress:
         comparison = Comparison(ctx, fan, model, size, lights)
         try:
-            measured = list(comparison.rows(angles, cameras, method, progress))
+            measured = list(comparison.rows(angles, cameras, progress))
         finally:
             comparison.release()
     rows = [row for row, _ in measured]
@@ -155,14 +171,15 @@ def _context() -> Iterator[moderngl.Context]:
         ctx.release()
 
 
-def _load(path: Path, up: str) -> Fan | Model:
+def _load(path: Path, up: str | None, allow_missing_textures: bool) -> Fan | Model:
     if path.suffix.lower() == ".fan":
+        refuse_with_fan(path, up=up, allow_missing_textures=allow_missing_textures)
         from impostor.files.fan_file import read_fan
 
         return read_fan(path)
     from impostor.model import load_model
 
-    return load_model(path, up=up)
+    return load_model(path, up=up or "y", allow_missing_textures=allow_missing_textures)
 
 
 def _check_method(method: str) -> None:

@@ -23,6 +23,7 @@ from runtime.renderer import DEFAULT_AMBIENT, DEFAULT_LIGHTS, ImpostorRenderer
 BACKGROUND = (0.4, 0.5, 0.6, 1.0)
 MESH_SAMPLES = 4
 SSIM_WINDOW = 7
+METHOD = "nearest"  # how views between the views are made
 HIGHEST_PSNR = 100.0  # dB, of equal pictures: JSON has no infinity
 
 
@@ -33,6 +34,7 @@ class Row:
     Parameters
     ----------
     method : str
+        How views between the views are made; "nearest" shows the nearest one.
     offset_deg : float
         Camera elevation above the fan's.
     psnr_db : float
@@ -71,7 +73,7 @@ def between_cameras(fan: Fan, count: int) -> list[float]:
 def between_directions(fan: Fan, count: int) -> list[tuple[float, float]]:
     """Azimuths and elevations in radians of cameras between the fan's views, whatever its layout."""
     if fan.layout == "ring":
-        elevation = np.radians(float(fan.settings.get("elevation", 0.0)))
+        elevation = float(np.arcsin(fan.views.basis[0, 2, 1]))
         return [(azimuth, elevation) for azimuth in between_cameras(fan, count)]
     back = fan.views.basis[:, 2]
     index = np.arange(count) * len(back) // count
@@ -135,7 +137,6 @@ class Comparison:
         self,
         offsets_deg: Sequence[float],
         cameras: int = 8,
-        method: str = "nearest",
         progress: Callable[[int, int], object] = lambda done, total: None,
     ) -> Iterator[tuple[Row, Pair]]:
         """Measure at each elevation offset; yields a row and its first camera's pair.
@@ -143,25 +144,36 @@ class Comparison:
         Raises
         ------
         SettingsError
-            Fewer than one camera.
+            Fewer than one camera, or cameras that would stand beyond the pole of a ring.
         """
         if cameras < 1:
             raise SettingsError("cameras", f"{cameras}; expected at least 1")
+        directions = between_directions(self._fan, cameras)
+        if self._fan.layout == "ring":
+            _check_offsets(offsets_deg, np.degrees(directions[0][1]))
         for number, offset in enumerate(offsets_deg):
             measured, first = [], None
-            for index, (azimuth, elevation) in enumerate(between_directions(self._fan, cameras)):
+            for index, (azimuth, elevation) in enumerate(directions):
                 pair = self.pair(azimuth, elevation + np.radians(offset))
                 first = first or pair
                 measured.append(errors(pair))
                 progress(number * cameras + index + 1, len(offsets_deg) * cameras)
             means = np.mean(measured, axis=0).tolist()
             assert first is not None
-            yield Row(method, float(offset), *means), first
+            yield Row(METHOD, float(offset), *means), first
 
     def release(self) -> None:
         """Free everything on the GPU."""
         for part in (self._fans, self._meshes, self._impostor, self._truth):
             part.release()
+
+
+def _check_offsets(offsets_deg: Sequence[float], ring_deg: float) -> None:
+    # Beyond the pole a camera comes down again on the other side: nearer to the ring than the offset says.
+    for offset in offsets_deg:
+        if not abs(ring_deg + offset) <= 90 + 1e-9:
+            limits = f"{-90 - ring_deg:.4g} to {90 - ring_deg:.4g}"
+            raise SettingsError("offsets_deg", f"{offset:g} degrees from a ring at {ring_deg:.4g}; expected {limits}")
 
 
 def over_background(pixels: NDArray[np.uint8]) -> NDArray[np.float32]:

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from impostor.lighting import Gloss
 from runtime.fan_textures import FanTextures
 from runtime.gl_state import CallerState, set_state
-from runtime.gpu import load_program, set_uniforms
+from runtime.gpu import InstanceBuffer, load_program, set_uniforms
 from runtime.instances import Instances, Quads, Viewer, quads_toward
 from runtime.lights import LightTable
-from runtime.relight import CORNERS, ROW_DTYPE, TILE_DTYPE, ColormapPass, InstanceBuffer, RelightPass
+from runtime.relight import ROW_DTYPE, TILE_DTYPE, ColormapPass, RelightPass
 from runtime.tiles import CacheFull, TileCache, TileIndex
 
 QUAD_DTYPE = np.dtype(
@@ -25,10 +25,16 @@ QUAD_DTYPE = np.dtype(
         ("up", "f4", (3,)),
         ("toward_eye", "f4", (3,)),
         ("rectangle", "f4", (4,)),
+        ("corner_cuts", "f4", (4,)),
         ("place", "f4", (3,)),
         ("depth", "f4", (4,)),
     ]
 )
+# Corners are cut where that spares so many texels of the relit tile: small triangles cost more than they spare.
+SPARED_TEXELS = 800
+# As triangle strips: corner of the covered rectangle; 1 where it is cut along y, 0 along x.
+RECTANGLE = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], "f4")
+OCTAGON = np.array([(x, y, along) for y, sides in ((0, (1, 0)), (1, (0, 1))) for along in sides for x in (0, 1)], "f4")
 ALPHA_CUTOFF = 1 / 32
 # A tile may be drawn this much larger than it is before the next finer mip level is relit.
 MAGNIFICATION = 1.2
@@ -89,12 +95,16 @@ class ImpostorPass:
         self._cache: TileCache | None = None
         self._program = load_program(ctx, "impostor.vert", "impostor.frag")
         self._colormaps, self._relight = ColormapPass(ctx), RelightPass(ctx)
-        self._corners, self._quads = ctx.buffer(CORNERS), InstanceBuffer(ctx, QUAD_DTYPE)
-        names = QUAD_DTYPE.names or ()
-        self._array = ctx.vertex_array(
-            self._program,
-            [(self._corners, "2f", "corner"), (self._quads.buffer, "3f 3f 3f 3f 4f 3f 4f/i", *names)],
+        self._quads, self._corners = (
+            InstanceBuffer(ctx, QUAD_DTYPE),
+            [ctx.buffer(each) for each in (RECTANGLE, OCTAGON)],
         )
+        names = QUAD_DTYPE.names or ()
+        instances = (self._quads.buffer, "3f 3f 3f 3f 4f 4f 3f 4f/i", *names)
+        self._rectangles, self._octagons = (
+            ctx.vertex_array(self._program, [(corners, "3f", "corner"), instances]) for corners in self._corners
+        )
+        self._shape = self._rectangles
         self._indexes: dict[tuple[int, Gloss], TileIndex] = {}
         self._frame: tuple[object, ...] | None = None
         self._shown: list[_Tiles] = []
@@ -126,7 +136,7 @@ class ImpostorPass:
         set_state(depth_test=True, depth_write=True, blend=(moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA))
         cache.color.use(0)
         cache.depth.use(1)
-        self._array.render(moderngl.TRIANGLE_STRIP, instances=count)
+        self._shape.render(moderngl.TRIANGLE_STRIP, instances=count)
 
     def forget(self) -> None:
         """Drop every relit tile."""
@@ -150,6 +160,7 @@ class ImpostorPass:
         )
         order = np.argsort(-(records["center"] @ _sight(viewer)), kind="stable")
         self._quads.write(records[order])
+        self._shape = self._octagons if records["corner_cuts"].any() else self._rectangles
         assert self._cache is not None
         set_uniforms(
             self._program,
@@ -252,8 +263,10 @@ class ImpostorPass:
 
     def release(self) -> None:
         """Free everything this pass made."""
-        for resource in (self._array, self._quads, self._corners, self._program, self._colormaps, self._relight):
+        for resource in (self._rectangles, self._octagons, self._quads, *self._corners, self._program):
             resource.release()
+        for part in (self._colormaps, self._relight):
+            part.release()
         if self._cache is not None:
             self._cache.release()
             self._cache = None
@@ -285,7 +298,14 @@ def _records(batch: Batch, quads: Quads, places: NDArray[np.int32]) -> NDArray[n
     # One texel of the relit tile more on every side, for the filter.
     border = fan.size // np.maximum(places[:, 2], 1)
     edges = np.stack([left - border, fan.size - bottom - border, right + border, fan.size - top + border], axis=-1)
-    records["rectangle"] = np.clip(edges, 0, fan.size) * (2 / fan.size) - 1
+    inside = np.clip(edges, 0, fan.size)
+    records["rectangle"] = inside * (2 / fan.size) - 1
+    # What the tile's edge takes from a corner is no longer there to be cut.
+    taken = np.abs(edges - inside)
+    cuts = fan.empty_corners[quads.view][:, [2, 3, 0, 1]] - taken[:, [0, 2, 0, 2]] - taken[:, [1, 1, 3, 3]]
+    cuts = np.maximum(cuts, 0) * (2 / fan.size)
+    spared = np.square(cuts).sum(axis=1) / 2 * np.square(places[:, 2] / 2)
+    records["corner_cuts"] = cuts * (spared > SPARED_TEXELS)[:, None]
     records["place"] = places
     low, high = fan.views.depth_range[quads.view].T
     offset, slope_right, slope_up = fan.views.plane[quads.view].T

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,7 +10,7 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from impostor.errors import SettingsError
+from impostor.errors import SettingsError, ViewWarning
 from impostor.fan import Fan
 from impostor.lighting import DirectionalLight, Gloss
 from impostor.model import Model
@@ -23,6 +24,7 @@ OUTPUTS = ("lit", "albedo", "normal", "depth", "alpha")
 MESH_SAMPLES = 4
 GROUND_ALBEDO = (0.55, 0.54, 0.5)
 GROUND_REACH = 12  # bounding radii
+FARTHEST_OFF_DEG = 20  # above or below the views: plausible so far, as the paper has it, though some 14 dB off
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class PictureSettings:
 
     def __post_init__(self):
         if self.output not in OUTPUTS:
-            raise SettingsError("--output", f"{self.output!r}; expected one of {', '.join(OUTPUTS)}")
+            raise SettingsError("output", f"{self.output!r}; expected one of {', '.join(OUTPUTS)}")
 
 
 def orbit_camera(subject: Fan | Model, azimuth: float, elevation: float, aspect: float) -> Camera:
@@ -96,7 +98,14 @@ def draw_picture(
     ------
     GpuError
         The GPU cannot hold a picture of that size.
+
+    Warns
+    -----
+    ViewWarning
+        A fan is seen from far above or below its views.
     """
+    if isinstance(subject, Fan):
+        _warn_of_elevation(subject, camera)
     target = Offscreen(ctx, settings.width, settings.height, MESH_SAMPLES if isinstance(subject, Model) else 1)
     renderer = ImpostorRenderer(ctx)
     try:
@@ -120,6 +129,15 @@ def draw_picture(
     finally:
         renderer.release()
         target.release()
+
+
+def _warn_of_elevation(fan: Fan, camera: Camera) -> None:
+    toward_eye = np.array([camera.toward_eye(fan.bounds.mean(axis=0))[1], *fan.views.basis[:, 2, 1]])
+    seen, *views = np.degrees(np.arcsin(np.clip(toward_eye, -1, 1))).tolist()
+    off = max(min(views) - seen, seen - max(views))
+    if off > FARTHEST_OFF_DEG:
+        found = f"{fan.name}: seen from an elevation of {seen:.3g} degrees, {off:.3g} away from its views"
+        warnings.warn(ViewWarning(f"{found}; expected at most {FARTHEST_OFF_DEG}, or a fan baked there"), stacklevel=3)
 
 
 def _draw_ground(renderer: ImpostorRenderer, subject: Fan | Model, camera: Camera, settings: PictureSettings) -> None:

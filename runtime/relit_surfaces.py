@@ -144,12 +144,10 @@ class RelitPictures:
         self._corners.release()
 
 
-def packed_terms(
-    weights: NDArray[np.float64], strengths: NDArray[np.float64], colors: NDArray[np.float64]
-) -> NDArray[np.float32]:
+def packed_terms(weights: NDArray[np.float64], colors: NDArray[np.float64]) -> NDArray[np.float32]:
     """What `flat_terms` gives, as `ptm_terms.glsl` reads it, (N, 12)."""
     packed = np.zeros((len(weights), 12), np.float32)
-    packed[:, :6], packed[:, 6], packed[:, 8:11] = weights, strengths, colors
+    packed[:, :6], packed[:, 8:11] = weights, colors
     return packed
 
 

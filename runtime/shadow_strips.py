@@ -13,9 +13,8 @@ from impostor.lighting import DirectionalLight
 from impostor.shadow_projection import LEVEL_CAMERA, Ground, ground_from_sight, strip_points
 from impostor.strips import silhouette_strips
 from impostor.views import rotation_about_y
-from runtime.gpu import load_program, set_uniforms
+from runtime.gpu import InstanceBuffer, load_program, set_uniforms
 from runtime.instances import Instances, Quads, Viewer, nearest_views, quads_toward
-from runtime.relight import InstanceBuffer
 from runtime.shadow_bounds import box_corners
 
 CASTER_DTYPE = np.dtype([("position_scale", "f4", (4,)), ("turn", "f4", (2,)), ("rows", "f4", (4, 4))])

@@ -17,10 +17,10 @@ from impostor.fan import Fan
 from impostor.lighting import DirectionalLight
 from impostor.shadow_projection import Ground, casts_shadow
 from runtime.gl_state import CallerState, clear_color, set_state
-from runtime.gpu import check_texture_size, load_program, set_uniforms
+from runtime.gpu import InstanceBuffer, check_texture_size, load_program, set_uniforms
 from runtime.instances import Instances, Viewer
 from runtime.meshes import MeshInstance, draw_parts
-from runtime.relight import CORNERS, InstanceBuffer
+from runtime.relight import CORNERS
 from runtime.shadow_bounds import CELL, box_corners, covered_cells, in_view, shadow_hulls
 from runtime.shadow_strips import CastingFan, StripPass
 

@@ -6,13 +6,16 @@ from collections.abc import Sequence
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 from impostor.lighting import DirectionalLight
 from impostor.local_light import LocalLight
 from impostor.model import Model
-from runtime.gpu import check_texture_size, set_uniforms
+from runtime.gpu import set_uniforms
 from runtime.tangents import tangent_mesh
 
+MOST_LIGHTS = 48  # as the shader's array has it
+FAINTEST = 1e-4  # linear light; the darkest code but black is three times that
 Light = DirectionalLight | LocalLight
 VERTEX_DTYPE = np.dtype([("position", "f4", (3,)), ("uv", "f4", (2,)), ("normal", "f4", (3,)), ("tangent", "f4", (4,))])
 
@@ -61,36 +64,29 @@ class SurfaceBuffers:
             resource.release()
 
 
-class SurfaceLights:
-    """Any number of directional and local lights, as the texture that `ptm_lights.glsl` reads."""
+def lights_at(lights: Sequence[Light], middle: NDArray[np.float64], radius: float) -> list[Light]:
+    """The lights that can be seen to reach into a sphere; the MOST_LIGHTS strongest where there are more.
 
-    def __init__(self, ctx: moderngl.Context):
-        self._ctx = ctx
-        self._held: tuple[Light, ...] = ()
-        self._texture = ctx.texture((2, 1), 4, dtype="f4")
-        self._texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+    Parameters
+    ----------
+    lights : sequence of DirectionalLight or LocalLight
+    middle : ndarray, (3,) float
+    radius : float
+        Metres.
+    """
+    strongest = np.array([max(light.color) for light in lights], float)
+    for index, light in enumerate(lights):
+        if isinstance(light, LocalLight):
+            distance = max(float(np.linalg.norm(np.array(light.position) - middle)) - radius, light.radius)
+            strongest[index] /= distance**2
+    order = np.argsort(-strongest, kind="stable")[:MOST_LIGHTS]
+    return [lights[index] for index in order if strongest[index] > FAINTEST]
 
-    def update(self, lights: Sequence[Light]) -> None:
-        """Take over the lights of this frame; nothing is written when they are those of the last one."""
-        if tuple(lights) == self._held:
-            return
-        check_texture_size(self._ctx, f"{len(lights)} lights", 2, len(lights))
-        rows = np.zeros((max(len(lights), 1), 2, 4), np.float32)
-        for row, light in zip(rows, lights, strict=False):
-            row[0] = (*light.toward, 0.0) if isinstance(light, DirectionalLight) else (*light.position, light.radius)
-            row[1, :3] = light.color
-        if self._texture.height != len(rows):
-            self._texture.release()
-            self._texture = self._ctx.texture((2, len(rows)), 4, dtype="f4")
-            self._texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._texture.write(rows.tobytes())
-        self._held = tuple(lights)
 
-    def bind(self, program: moderngl.Program, unit: int) -> None:
-        """Give a program that includes `ptm_lights.glsl` the lights."""
-        self._texture.use(unit)
-        set_uniforms(program, lights=unit, light_count=len(self._held))
-
-    def release(self) -> None:
-        """Free the texture."""
-        self._texture.release()
+def bind_lights(program: moderngl.Program, lights: Sequence[Light]) -> None:
+    """Give a program that includes `ptm_lights.glsl` its lights, MOST_LIGHTS at most."""
+    rows = np.zeros((MOST_LIGHTS, 2, 4), np.float32)
+    for row, light in zip(rows, lights, strict=False):
+        row[0] = (*light.toward, 0.0) if isinstance(light, DirectionalLight) else (*light.position, light.radius)
+        row[1, :3] = light.color
+    set_uniforms(program, lights=rows.ravel(), light_count=len(lights))

@@ -15,15 +15,14 @@ from impostor.model import Model
 from impostor.ptm.quantise import Ptm
 from impostor.ptm_shading import ambient_gain, flat_terms
 from impostor.shadow_projection import Ground
+from runtime.checks import check_type, numbers
 from runtime.gl_state import CallerState, set_state
 from runtime.gpu import load_program, set_uniforms
 from runtime.instances import Viewer
 from runtime.meshes import OUTPUTS
 from runtime.relit_surfaces import MOST_TERMS, RelitPicture, RelitPictures, bind_terms, packed_terms
-from runtime.surface_buffers import Light, SurfaceBuffers, SurfaceLights
+from runtime.surface_buffers import Light, SurfaceBuffers, bind_lights, lights_at
 from runtime.surface_textures import KINDS, PtmTextures
-
-LIGHT_UNIT = 5  # after the textures of a PTM
 
 
 @dataclass(eq=False)
@@ -56,12 +55,25 @@ class Surface:
     gloss: Gloss = field(default_factory=Gloss)
 
     def __post_init__(self):
-        tiling, matrix = np.asarray(self.tiling, float), np.array(self.world_from_model, float)
-        if tiling.shape != (2,) or not ((tiling > 0) & np.isfinite(tiling)).all():
-            raise SettingsError("surface", f"tiling {self.tiling}; expected two numbers above 0")
-        if matrix.shape != (4, 4) or not np.all(np.isfinite(matrix)):
-            raise SettingsError("surface", f"world_from_model of shape {matrix.shape}; expected (4, 4), all finite")
-        self.tiling, self.world_from_model = (float(tiling[0]), float(tiling[1])), matrix
+        check_type("surface", self.ptm, Ptm, ", as read_ptm and quantise give")
+        check_type("surface", self.model, Model, ", as impostor.load_model gives")
+        tiling = numbers("surface", "tiling", self.tiling, (2,))
+        if not (tiling > 0).all():
+            raise SettingsError("surface", f"tiling {tuple(self.tiling)}; expected two numbers above 0")
+        self.tiling = float(tiling[0]), float(tiling[1])
+        self.world_from_model = np.array(self.matrix())
+
+    def matrix(self) -> NDArray[np.float64]:
+        """`world_from_model`, checked.
+
+        Raises
+        ------
+        SettingsError
+        """
+        matrix = numbers("surface", "world_from_model", self.world_from_model, (4, 4))
+        if not abs(np.linalg.det(matrix)) > 0:
+            raise SettingsError("surface", "world_from_model has no inverse; expected a matrix that has one")
+        return matrix
 
 
 def rectangle(width: float, height: float) -> Model:
@@ -109,8 +121,9 @@ class SurfacePass:
         self._ctx, self._anisotropy = ctx, anisotropy
         self._flat = {kind: load_program(ctx, "ptm_flat.vert", f"ptm_flat_{kind}.frag") for kind in KINDS}
         self._lit = {kind: load_program(ctx, "ptm_lit.vert", f"ptm_lit_{kind}.frag") for kind in KINDS}
+        self._glossy = {kind: load_program(ctx, "ptm_lit.vert", f"ptm_glossy_{kind}.frag") for kind in KINDS}
         self._plain = load_program(ctx, "ptm_flat.vert", "ptm_relit.frag")
-        self._relit, self._lights = RelitPictures(ctx), SurfaceLights(ctx)
+        self._relit = RelitPictures(ctx)
         self._textures: dict[int, PtmTextures] = {}
         self._buffers: dict[int, SurfaceBuffers] = {}
         self.statistics: dict[str, int] = {}
@@ -168,10 +181,14 @@ class SurfacePass:
         if output != "lit":
             lights, ambient = (), 1.0
         self.prepare(surfaces)
-        seen = [surface for surface in surfaces if _is_seen(surface, viewer)]
+        spheres = [_sphere(surface) for surface in surfaces]
+        seen = [
+            each
+            for each, (at, reach) in zip(surfaces, spheres, strict=True)
+            if viewer.sees(at[None], np.array([reach]))[0]
+        ]
         flat = {surface: self._terms(surface, lights, ambient) for surface in seen} if output != "normal" else {}
         pictures = self._pictures(flat) if output == "lit" else {}
-        self._lights.update(lights)
         state.bind_target()
         set_state(depth_test=True, depth_write=True)
         for surface in seen:
@@ -181,9 +198,7 @@ class SurfacePass:
             elif terms is not None:
                 program = self._bind_flat(surface, terms)
             else:
-                program = self._bind_lit(surface, ambient)
-                set_uniforms(program, eye=tuple(viewer.eye), output_kind=OUTPUTS[output])
-                set_uniforms(program, view_from_world=viewer.view_from_world[:3, :3])
+                program = self._bind_lit(surface, viewer, lights, ambient, output == "normal")
             self._draw_mesh(program, surface, viewer)
         self.statistics = {"surfaces": len(seen), "plain": len(pictures), "relit": self._relit.made}
 
@@ -193,7 +208,7 @@ class SurfacePass:
         directional = [light for light in lights if isinstance(light, DirectionalLight)]
         if frame is None or surface.gloss.strength > 0 or len(lights) >= MOST_TERMS or len(directional) < len(lights):
             return None
-        turn = np.asarray(surface.world_from_model, float)[:3, :3]
+        turn = surface.matrix()[:3, :3]
         turned = frame @ (turn / np.cbrt(np.linalg.det(turn))).T
         return packed_terms(*flat_terms(turned, directional, ambient, surface.ptm.curve))
 
@@ -219,13 +234,23 @@ class SurfacePass:
         bind_terms(program, terms)
         return program
 
-    def _bind_lit(self, surface: Surface, ambient: ArrayLike) -> moderngl.Program:
-        textures = self._textures[id(surface.ptm)]
-        program = self._lit[textures.kind]
+    def _bind_lit(
+        self, surface: Surface, viewer: Viewer, lights: Sequence[Light], ambient: ArrayLike, normals: bool
+    ) -> moderngl.Program:
+        textures, glossy = self._textures[id(surface.ptm)], surface.gloss.strength > 0 or normals
+        program = (self._glossy if glossy else self._lit)[textures.kind]
         textures.bind(program, repeat=self._repeats(surface))
-        self._lights.bind(program, unit=LIGHT_UNIT)
+        bind_lights(program, lights_at(lights, *_sphere(surface)))
         around = ambient_gain(surface.ptm.curve) * np.broadcast_to(np.asarray(ambient, float), (3,))
-        set_uniforms(program, ambient=around, gloss=(surface.gloss.strength, surface.gloss.shininess))
+        set_uniforms(program, ambient=around)
+        if glossy:
+            set_uniforms(
+                program,
+                eye=tuple(viewer.eye),
+                gloss=(surface.gloss.strength, surface.gloss.shininess),
+                show_normals=normals,
+                view_from_world=viewer.view_from_world[:3, :3],
+            )
         return program
 
     def _repeats(self, surface: Surface) -> bool:
@@ -234,7 +259,7 @@ class SurfacePass:
         return bool(reach.min() < -1e-6 or reach.max() > 1 + 1e-6)
 
     def _draw_mesh(self, program: moderngl.Program, surface: Surface, viewer: Viewer) -> None:
-        matrix = np.asarray(surface.world_from_model, float)
+        matrix = surface.matrix()
         set_uniforms(
             program, clip_from_world=viewer.clip_from_world, world_from_model=matrix, tiling=tuple(surface.tiling)
         )
@@ -243,13 +268,13 @@ class SurfacePass:
     def release(self) -> None:
         """Free everything this pass made."""
         self.prepare(())
-        for part in (*self._flat.values(), *self._lit.values(), self._plain, self._relit, self._lights):
+        for part in (*self._flat.values(), *self._lit.values(), *self._glossy.values(), self._plain, self._relit):
             part.release()
 
 
-def _is_seen(surface: Surface, viewer: Viewer) -> bool:
+def _sphere(surface: Surface) -> tuple[NDArray[np.float64], float]:
+    """Middle (3,) and radius of a sphere around the surface, world space."""
     low, high = surface.model.bounds
-    matrix = np.asarray(surface.world_from_model, float)
-    center = matrix[:3, :3] @ ((low + high) / 2) + matrix[:3, 3]
-    reach = np.linalg.norm(high - low) / 2 * np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
-    return bool(viewer.sees(center[None], np.array([reach]))[0])
+    matrix = surface.matrix()
+    scale = np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
+    return matrix[:3, :3] @ ((low + high) / 2) + matrix[:3, 3], float(np.linalg.norm(high - low) / 2 * scale)

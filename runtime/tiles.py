@@ -49,40 +49,33 @@ class TileCache:
         self.clear()
 
     def clear(self) -> None:
-        """Forget every tile."""
-        self._places: dict[tuple[Any, ...], tuple[int, int, int]] = {}
+        """Give every place back."""
         self._pages_used = 0
         self._open: dict[int, tuple[int, int]] = {}
 
-    def places(self, keys: list[tuple[Any, ...]], sizes: list[int]) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-        """Where the tiles with these keys lie, making room for those that are new.
+    def place(self, sizes: list[int]) -> NDArray[np.int32]:
+        """Make room for tiles; which tile is where is for a `TileIndex` to know.
 
         Parameters
         ----------
-        keys : list of tuple
-            Whatever tells two relit tiles apart.
         sizes : list of int
             Side of each tile in texels.
 
         Returns
         -------
-        places : ndarray, (N, 3) int32
+        ndarray, (N, 3) int32
             x, y and side in the cache.
-        new : ndarray, (N,) bool
-            True where the tile has no picture yet.
 
         Raises
         ------
         CacheFull
-            The new tiles do not fit; those already placed stay.
+            They do not all fit; tiles placed before stay where they are.
         """
-        found = [self._places.get(key) for key in keys]
-        new = np.array([place is None for place in found], bool)
-        for index in np.flatnonzero(new):
-            found[index] = self._place(sizes[index])
-        for index in np.flatnonzero(new):
-            self._places[keys[index]] = found[index]  # type: ignore[assignment]
-        return np.array(found, np.int32).reshape(-1, 3), new
+        return np.array([self._place(size) for size in sizes], np.int32).reshape(-1, 3)
+
+    def places(self, keys: list[tuple[Any, ...]], sizes: list[int]) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+        """As `place`."""
+        return self.place(sizes), np.ones(len(keys), bool)
 
     def _place(self, size: int) -> tuple[int, int, int]:
         cell = 1 << max(size - 1, 0).bit_length()

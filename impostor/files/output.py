@@ -86,7 +86,9 @@ def atomic_output(path: str | os.PathLike[str], force: bool = False) -> Iterator
             _lock(held.fileno())
             yield temporary
             os.fsync(held.fileno())
-        _publish(temporary, final, force)
+            if fcntl is None:
+                held.close()  # Windows gives no open file another name
+            _publish(temporary, final, force)
     except OSError as error:
         if error.errno not in _CANNOT_WRITE:
             raise

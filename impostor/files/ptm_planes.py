@@ -22,6 +22,8 @@ from impostor.errors import PtmFileError
 from impostor.files.ptm_header import SIDE_RECORD, PlaneEntry
 
 Plane = NDArray[np.uint8]
+Reference = tuple[int, bool]  # which plane, -1 for none; whether it is inverted
+ALONE: Reference = (-1, False)
 MIDDLE = 128
 THREADS = 2
 # A side record of 5 bytes pays where it removes more squared error than 5 more bytes of JPEG would: at 6 dB a bit
@@ -117,7 +119,7 @@ def encode_planes(planes: Sequence[Plane], quality: int, predict: bool) -> list[
     Reference planes are the spanning arborescence of least bytes, measured by encoding every difference. A plane
     differs from its reference as that comes out of the decoder, so that errors do not add up.
     """
-    references = _choose_references(planes, quality) if predict else [(-1, False)] * len(planes)
+    references = _choose_references(planes, quality) if predict else [ALONE] * len(planes)
     done: dict[int, EncodedPlane] = {}
     with ThreadPoolExecutor(THREADS) as pool:
         while len(done) < len(planes):
@@ -126,22 +128,23 @@ def encode_planes(planes: Sequence[Plane], quality: int, predict: bool) -> list[
                 for index, (reference, _) in enumerate(references)
                 if index not in done and (reference < 0 or reference in done)
             ]
-            encoded = list(pool.map(lambda index: _smallest(planes[index], *references[index], done, quality), ready))
-            for index, (jpeg, side, reference, inverted, decoded) in zip(ready, encoded, strict=True):
+            encoded = list(pool.map(lambda index: _smallest(planes[index], references[index], done, quality), ready))
+            for index, (jpeg, side, (reference, inverted), decoded) in zip(ready, encoded, strict=True):
                 done[index] = EncodedPlane(jpeg, side, len(done), reference, inverted, decoded)
     return [done[index] for index in range(len(planes))]
 
 
 def _smallest(
-    plane: Plane, reference: int, inverted: bool, done: dict[int, EncodedPlane], quality: int
-) -> tuple[bytes, bytes, int, bool, Plane]:
-    """JPEG, side information, reference, inversion and decoded plane, of the choice that takes fewer bytes."""
+    plane: Plane, choice: Reference, done: dict[int, EncodedPlane], quality: int
+) -> tuple[bytes, bytes, Reference, Plane]:
+    """JPEG, side information, reference and decoded plane: with the reference or alone, whichever takes fewer bytes."""
     jpeg, side, decoded = _encode(plane, None, quality)
+    reference, inverted = choice
     if reference >= 0:
         other_jpeg, other_side, other = _encode(plane, _turned(done[reference].decoded, inverted), quality)
         if len(other_jpeg) + len(other_side) < len(jpeg) + len(side):
-            return other_jpeg, other_side, reference, inverted, other
-    return jpeg, side, -1, False, decoded
+            return other_jpeg, other_side, choice, other
+    return jpeg, side, ALONE, decoded
 
 
 def _encode(plane: Plane, reference: Plane | None, quality: int) -> tuple[bytes, bytes, Plane]:
@@ -170,7 +173,7 @@ def _worth_a_record(plane: Plane, decoded: Plane, predicted: bool) -> NDArray[np
     return wrong
 
 
-def _choose_references(planes: Sequence[Plane], quality: int) -> list[tuple[int, bool]]:
+def _choose_references(planes: Sequence[Plane], quality: int) -> list[Reference]:
     """The reference of every plane (-1 for none) and whether it is inverted, so that all take the fewest bytes."""
     sample = [_sample(plane) for plane in planes]
     count = len(planes)

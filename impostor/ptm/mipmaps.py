@@ -126,4 +126,5 @@ def _halve_rows(texels: NDArray[np.float32]) -> NDArray[np.float32]:
         return (texels[0::2] + texels[1::2]) * np.float32(0.5)
     # Each of `half` results covers count / half texels: a part of one, a whole one and a part of the next.
     first = ((half - np.arange(half)) / count).astype(np.float32).reshape(-1, *[1] * (texels.ndim - 1))
-    return first * texels[0:-1:2] + np.float32(half / count) * texels[1::2] + first[::-1] * texels[2::2]
+    means = first * texels[0:-1:2] + np.float32(half / count) * texels[1::2] + first[::-1] * texels[2::2]
+    return means.astype(np.float32, copy=False)

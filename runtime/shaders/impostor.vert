@@ -2,11 +2,12 @@
 // One instance draws one object: a quad in the plane of its fan view.
 uniform mat4 clip_from_world;
 uniform vec2 cache_size;
-in vec2 corner;       // 0..1, y up
+in vec3 corner;       // of the covered rectangle, 0..1, y up; 1 where it is cut along y, 0 along x
 in vec3 center;       // world
 in vec3 right, up;    // world, from the middle of the tile to its edge
 in vec3 toward_eye;   // world: what one metre of depth along the view's back moves the picture toward the eye
 in vec4 rectangle;    // the covered part of the tile: left, bottom, right, top in -1..1
+in vec4 corner_cuts;  // length of what is cut off: left bottom, right bottom, left top, right top
 in vec3 place;        // x, y and side of the relit tile in the cache
 in vec4 depth;        // metres in front of the quad: at depth 0, from there to depth 1, and per unit of plane x and y
 out vec2 v_uv;
@@ -16,7 +17,11 @@ out float v_depth_start;
 flat out float v_depth_span;
 
 void main() {
-    vec2 plane = mix(rectangle.xy, rectangle.zw, corner);
+    // The rectangle without its empty corners: an octagon.
+    vec2 bottom_top = corner.x < 0.5 ? corner_cuts.xz : corner_cuts.yw;
+    float cut = corner.y < 0.5 ? bottom_top.x : bottom_top.y;
+    vec2 inward = (1.0 - 2.0 * corner.xy) * vec2(1.0 - corner.z, corner.z);
+    vec2 plane = mix(rectangle.xy, rectangle.zw, corner.xy) + cut * inward;
     gl_Position = clip_from_world * vec4(center + plane.x * right + plane.y * up, 1.0);
     // Row 0 of a tile is its top: the one flip between images and OpenGL.
     v_uv = (place.xy + (vec2(plane.x, -plane.y) * 0.5 + 0.5) * place.z) / cache_size;

@@ -6,9 +6,5 @@
 
 void main() {
     fetch_ptm(v_uv);
-    mat3 frame = tangent_frame();
-    if (output_kind == 2)
-        color = vec4(view_from_world * ptm_normal(frame) * 0.5 + 0.5, 1.0);
-    else
-        color = vec4(srgb_from_linear(light_here(frame)), 1.0);
+    color = vec4(srgb_from_linear(diffuse_light(tangent_frame())), 1.0);
 }

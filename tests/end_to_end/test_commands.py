@@ -125,6 +125,26 @@ def test_validate_names_what_is_sound_and_what_is_not(knot, tmp_path, capsys):
     assert err.startswith(f"{tmp_path / 'altered.fan'}: ") and err.count("\n") == 1
 
 
+def test_a_missing_texture_may_be_allowed(tmp_path, capsys):
+    model = write_obj(tmp_path / "square.obj", SQUARE, SQUARE_FACES)
+    model.write_text("mtllib square.mtl\nusemtl paint\n" + model.read_text())
+    (tmp_path / "square.mtl").write_text("newmtl paint\nKd 1 0 0\nmap_Kd gone.png\n")
+    fan = tmp_path / "square.fan"
+    assert run("bake", model, "-o", fan, *SMALL) == 1
+    assert "gone.png" in capsys.readouterr().err and not fan.exists()
+    allowed = (
+        ("bake", model, "-o", fan, *SMALL),
+        ("render", model, "-o", tmp_path / "a.png", "--size", "16x16", "--output", "albedo"),
+        ("compare", fan, model, "--offsets", 0, "--cameras", 1),
+    )
+    for command in allowed:
+        assert run(*command, "--allow-missing-textures") == 0
+        err = capsys.readouterr().err
+        assert err.count("\n") == 1 and err.startswith(f"impostor: warning: {model}: ") and "gone.png" in err
+    assert read_fan(fan).uniform_albedo.tolist() == [255, 0, 0]
+    assert pixels(tmp_path / "a.png")[8, 8].tolist() == [255, 0, 0, 255]
+
+
 # --- render
 
 
@@ -248,6 +268,24 @@ def test_gloss_brightens_where_the_light_is_mirrored(sphere, tmp_path):
         assert row == pytest.approx(31.5, abs=3)
 
 
+@pytest.mark.parametrize(
+    ("camera", "off"), [(("--elevation", 60), 45), (("--elevation", -20), 35), (("--eye", "0,9,1"), 68)]
+)
+def test_a_picture_from_far_off_the_ring_says_so(knot, tmp_path, capsys, camera, off):
+    assert run("render", knot, "-o", tmp_path / "a.png", "--size", "16x16", *camera) == 0
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1
+    assert err.startswith("impostor: warning: knot: seen from an elevation of ")
+    assert float(err.split(" degrees, ")[1].split()[0]) == pytest.approx(off, abs=1)
+
+
+def test_a_picture_near_the_ring_or_of_a_mesh_or_a_hemisphere_is_as_expected(knot, tmp_path, capsys):
+    hemisphere = baked(KNOT, tmp_path / "h.fan", "--views", 24, "--size", 32, "--layout", "hemisphere")
+    for subject, elevation in ((knot, 34), (knot, -4), (KNOT, 80), (hemisphere, 85)):
+        flags = ("--size", "16x16", "--elevation", elevation, "--force")
+        ok(capsys, "render", subject, "-o", tmp_path / "a.png", *flags)
+
+
 # --- compare
 
 
@@ -312,22 +350,25 @@ def test_the_flags_of_bake(tmp_path, capsys, flags):
     settings = read_fan(tmp_path / "a.fan").settings
     for flag, value in zip(flags[::2], flags[1::2], strict=True):
         assert settings[flag.removeprefix("--")] == value
-    ok(capsys, "render", tmp_path / "a.fan", "-o", tmp_path / "a.png", "--size", "32x32")
+    elevation = settings["elevation"] or 15
+    ok(capsys, "render", tmp_path / "a.fan", "-o", tmp_path / "a.png", "--size", "32x32", "--elevation", elevation)
 
 
 def test_every_flag_of_render_is_taken(knot, tmp_path, capsys):
     ok(
-        capsys, "render", knot, "-o", tmp_path / "a.png", "--size", "40x30", "--azimuth", -400, "--elevation", 90,
+        capsys, "render", knot, "-o", tmp_path / "a.png", "--size", "40x30", "--azimuth", -400, "--elevation", 30,
         "--light", "10,20", "--light", "30,40,0.5,0.25,1", "--ambient", 0.1, "--gloss", "0.5,20", "--method", "nearest",
-        "--output", "lit", "--no-shadow", "--background", "1,0,0", "--up", "y", "--force",
+        "--output", "lit", "--no-shadow", "--background", "1,0,0", "--force",
     )  # fmt: skip
     assert pixels(tmp_path / "a.png")[0, 0].tolist() == [255, 0, 0, 255]
+    ok(capsys, "render", KNOT, "-o", tmp_path / "b.png", "--up", "z", "--allow-missing-textures", "--size", "8x8")
 
 
 def test_every_flag_of_compare_is_taken(knot, tmp_path, capsys):
     ok(
-        capsys, "compare", knot, KNOT, "--json", "--offsets", "-5,90", "--cameras", 1, "--method", "nearest",
+        capsys, "compare", knot, KNOT, "--json", "--offsets", "-5,75", "--cameras", 1, "--method", "nearest",
         "--size", 16, "--light", "0,45", "--picture", tmp_path / "a.png", "--up", "y", "--force", "--quiet",
+        "--allow-missing-textures",
     )  # fmt: skip
 
 

@@ -169,22 +169,23 @@ def test_a_texture_is_not_one_albedo_and_takes_more_samples():
 
 def test_settings_are_recorded_as_the_command_line_spells_them():
     model = Model.from_arrays(SQUARE, SQUARE_FACES, name="square")
-    fan = bake_fan(model, views=3, elevation_deg=20.5, layout="hemisphere", size=24, distance=5.0, samples=1, up="z")
+    fan = bake_fan(model, views=3, elevation_deg=20.5, size=24, distance=5.0, samples=1, up="z")
     assert fan.settings == {
         "views": 3,
         "elevation": 20.5,
-        "layout": "hemisphere",
+        "layout": "ring",
         "size": 24,
         "perspective": 5.0,
         "samples": 1,
         "up": "z",
     }
-    assert (fan.name, fan.layout, len(fan.views)) == ("square", "hemisphere", 3)
+    assert (fan.name, fan.layout, len(fan.views)) == ("square", "ring", 3)
     assert fan.source == {"name": "square", "sha256": ""}
     np.testing.assert_allclose(fan.bounds, model.bounds)
     assert fan.radius == model.radius
     settings = bake_fan(model, views=1, size=16).settings
     assert (settings["perspective"], settings["samples"], settings["elevation"]) == (None, 2, 15)
+    assert bake_fan(model, views=1, size=16, layout="hemisphere").settings["elevation"] is None
 
 
 def test_progress_is_called_once_a_view():
@@ -214,24 +215,25 @@ def test_the_same_model_twice_is_the_same_fan(ball):
 
 
 @pytest.mark.parametrize(
-    ("options", "flag"),
+    ("options", "parameter"),
     [
-        ({"views": 0}, "--views"),
-        ({"views": MAX_VIEWS + 1}, "--views"),
-        ({"size": 7}, "--size"),
-        ({"size": 4097}, "--size"),
-        ({"elevation_deg": 90}, "--elevation"),
-        ({"layout": "cube"}, "--layout"),
-        ({"distance": 1.0}, "--perspective"),
-        ({"distance": 2 * FARTHEST}, "--perspective"),
-        ({"distance": np.nan}, "--perspective"),
+        ({"views": 0}, "views"),
+        ({"views": MAX_VIEWS + 1}, "views"),
+        ({"size": 7}, "size"),
+        ({"size": 4097}, "size"),
+        ({"elevation_deg": 90}, "elevation"),
+        ({"layout": "cube"}, "layout"),
+        ({"layout": "sphere", "elevation_deg": 15}, "elevation"),
+        ({"distance": 1.0}, "distance"),
+        ({"distance": 2 * FARTHEST}, "distance"),
+        ({"distance": np.nan}, "distance"),
         ({"samples": 3}, "samples"),
     ],
 )
-def test_numbers_out_of_range_are_refused(options, flag):
+def test_numbers_out_of_range_are_refused(options, parameter):
     with pytest.raises(SettingsError) as caught:
         bake_fan(solid_model(Sphere()), **{"views": 2, "size": 16, **options})
-    assert caught.value.where == flag
+    assert caught.value.where == parameter
     assert "expected" in caught.value.problem
 
 

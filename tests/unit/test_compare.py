@@ -7,6 +7,7 @@ import pytest
 from flip_evaluator import evaluate
 
 from bake.fan import bake_fan
+from impostor.errors import SettingsError
 from impostor.lighting import DirectionalLight
 from impostor.views import direction
 from runtime.compare import (
@@ -121,6 +122,13 @@ def test_rows_grow_worse_away_from_the_ring(comparison):
     assert near.psnr_db > far.psnr_db
     assert near.iou > far.iou > 0.5
     assert pair.mesh.shape == pair.impostor.shape == (64, 64, 4)
+
+
+@pytest.mark.parametrize("offset", [80, -106, np.nan])
+def test_offsets_beyond_the_pole_are_refused(comparison, offset):
+    with pytest.raises(SettingsError) as caught:
+        next(comparison.rows([0, offset], cameras=1))
+    assert (caught.value.where, "expected -105 to 75" in caught.value.problem) == ("offsets_deg", True)
 
 
 def test_offsets_count_from_the_fans_own_elevation(comparison):

@@ -228,7 +228,7 @@ class TestManyCopies:
         rendered = moderngl.VertexArray.render
 
         def spied(array, *arguments, **options):
-            if array is renderer._impostors._array:
+            if array in (renderer._impostors._rectangles, renderer._impostors._octagons):
                 calls.append(options["instances"])
             return rendered(array, *arguments, **options)
 
@@ -238,6 +238,18 @@ class TestManyCopies:
         draw(filling(5.0))
         assert calls == [800]
         assert renderer.statistics["instances"] == 800
+
+    def test_a_cut_corner_takes_nothing_off_the_picture(self, renderer, draw, monkeypatch):
+        """Large enough on the screen for an octagon; a ball leaves a lot of every corner free."""
+        renderer.add(solid_fan(Sphere(color=RED), Box((-1, -1, 0), (0, 0, 0.1), GREEN), views=4, size=64))
+        monkeypatch.setattr("runtime.impostors.SPARED_TEXELS", 10)
+        matrices = filling(1.2, 0.3)
+        cut = draw(matrices)
+        assert renderer._impostors._shape is renderer._impostors._octagons
+        monkeypatch.setattr("runtime.impostors.SPARED_TEXELS", 1e9)
+        renderer._impostors.forget()
+        np.testing.assert_array_equal(draw(matrices), cut)
+        assert renderer._impostors._shape is renderer._impostors._rectangles
 
     @pytest.mark.parametrize("matrices", [filling(3.0, 0.2), looking((1, 1, 9))])
     def test_the_order_of_the_arrays_does_not_show(self, renderer, draw, matrices):

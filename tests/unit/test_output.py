@@ -190,6 +190,21 @@ def test_a_living_writer_is_left_alone(tmp_path):
         end(writer)
 
 
+@pytest.mark.parametrize(("force", "publishing"), [(False, "link"), (True, "replace")])
+def test_a_finished_file_is_held_until_it_has_its_name(tmp_path, monkeypatch, force, publishing):
+    """Another writer that cleans up at that very moment takes nothing away."""
+
+    def publish(source, destination, publish=getattr(os, publishing)):
+        output._remove_litter(tmp_path / "a.fan")
+        publish(source, destination)
+
+    monkeypatch.setattr(os, publishing, publish)
+    with atomic_output(tmp_path / "a.fan", force) as temporary:
+        temporary.write_bytes(b"all")
+    assert (tmp_path / "a.fan").read_bytes() == b"all"
+    assert os.listdir(tmp_path) == ["a.fan"]
+
+
 def test_one_process_cannot_write_one_output_twice_at_once(tmp_path):
     with atomic_output(tmp_path / "a.fan") as temporary:
         temporary.write_bytes(b"first")

@@ -46,7 +46,7 @@ class TestLights:
         assert problem(caught).startswith(message)
         assert all(isinstance(light, DirectionalLight) for light in renderer.lights)
 
-    @pytest.mark.parametrize("draw", [name for name in DRAWS])
+    @pytest.mark.parametrize("draw", list(DRAWS))
     def test_what_is_no_light_is_refused_when_it_was_put_into_the_list(self, renderer, screen, draw):
         renderer.add(FAN)
         renderer.lights = [SUN]
@@ -85,7 +85,9 @@ class TestWhatIsPlaced:
             renderer.add_mesh(FAN)
         assert problem(caught) == "model: a Fan; expected a Model, as impostor.load_model gives"
 
-    @pytest.mark.parametrize("matrix", [np.eye(3), np.full((4, 4), np.nan), np.diag([1, 0, 1, 1]), "here", [[1], [2, 3]]])
+    @pytest.mark.parametrize(
+        "matrix", [np.eye(3), np.full((4, 4), np.nan), np.diag([1, 0, 1, 1]), "here", [[1], [2, 3]]]
+    )
     def test_impossible_places_of_a_mesh_are_refused(self, renderer, matrix):
         with pytest.raises(SettingsError) as caught:
             renderer.add_mesh(MODEL, matrix)
@@ -100,7 +102,7 @@ class TestWhatIsPlaced:
 
 
 class TestMatrices:
-    @pytest.mark.parametrize("draw", [name for name in DRAWS])
+    @pytest.mark.parametrize("draw", list(DRAWS))
     @pytest.mark.parametrize(
         ("clip", "view", "message"),
         [

@@ -21,8 +21,7 @@ def squares(places):
 
 def test_places_never_overlap_and_stay_inside(cache):
     sizes = [64, 16, 16, 40, 33, 8, 1, 4, 64, 16, 5]
-    places, new = cache.places([(index,) for index in range(len(sizes))], sizes)
-    assert new.all()
+    places = np.concatenate([cache.place(sizes[:4]), cache.place(sizes[4:])])
     assert places[:, 2].tolist() == sizes
     covered = squares(places)
     assert len(set().union(*covered)) == sum(map(len, covered))
@@ -30,29 +29,17 @@ def test_places_never_overlap_and_stay_inside(cache):
     assert (places[:, :2] + places[:, 2:]).max() <= 256
 
 
-def test_a_tile_keeps_its_place_until_the_cache_is_cleared(cache):
-    first, _ = cache.places([("a",), ("b",)], [16, 16])
-    again, new = cache.places([("b",), ("c",), ("a",)], [16, 16, 16])
-    assert new.tolist() == [False, True, False]
-    np.testing.assert_array_equal(again[[2, 0]], first)
-    cache.clear()
-    assert cache.places([("a",)], [16])[1].tolist() == [True]
-
-
 def test_the_cache_holds_as_many_tiles_as_fit_and_no_more(cache):
-    places, _ = cache.places([(index,) for index in range(256)], [16] * 256)
+    places = cache.place([16] * 256)
     assert len({(x, y) for x, y, _ in places.tolist()}) == 256
     with pytest.raises(CacheFull):
-        cache.places([("one more",)], [16])
-    kept, new = cache.places([(7,)], [16])
-    assert not new.any()
-    np.testing.assert_array_equal(kept[0], places[7])
+        cache.place([16])
+    cache.clear()
+    np.testing.assert_array_equal(cache.place([16] * 256), places)
 
 
 def test_no_tiles_need_no_place(cache):
-    places, new = cache.places([], [])
-    assert places.shape == (0, 3)
-    assert new.shape == (0,)
+    assert cache.place([]).shape == (0, 3)
 
 
 def test_a_cache_that_the_gpu_cannot_hold_is_refused(ctx):

@@ -165,11 +165,11 @@ def test_views_and_view_agree():
 @pytest.mark.parametrize(
     ("layout", "count", "elevation", "message"),
     [
-        ("ring", 0, 0.0, "--views: 0 views; expected 1 to 2048"),
-        ("sphere", MAX_VIEWS + 1, 0.0, "--views: 2049 views"),
-        ("ring", 8, np.pi / 2, "--elevation: 90 degrees"),
-        ("ring", 8, np.nan, "--elevation: nan degrees"),
-        ("disc", 8, 0.0, "--layout: 'disc'; expected one of ring, hemisphere, sphere"),
+        ("ring", 0, 0.0, "views: 0 views; expected 1 to 2048"),
+        ("sphere", MAX_VIEWS + 1, 0.0, "views: 2049 views"),
+        ("ring", 8, np.pi / 2, "elevation: 90 degrees"),
+        ("ring", 8, np.nan, "elevation: nan degrees"),
+        ("disc", 8, 0.0, "layout: 'disc'; expected one of ring, hemisphere, sphere"),
     ],
 )
 def test_impossible_layouts_are_refused(layout, count, elevation, message):
@@ -180,5 +180,5 @@ def test_impossible_layouts_are_refused(layout, count, elevation, message):
 
 @pytest.mark.parametrize("distance", [0.5, 0.0, -3.0, np.nan])
 def test_an_eye_inside_the_object_is_refused(distance):
-    with pytest.raises(SettingsError, match=r"^--perspective: .* expected more than"):
+    with pytest.raises(SettingsError, match=r"^distance: .* expected more than"):
         frame(ring_bases(4, 0.0), POINTS, 64, distance)

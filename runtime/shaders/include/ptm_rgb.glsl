@@ -26,8 +26,8 @@ vec3 ptm_value(vec4 w0123, vec2 w45) {
                 dot(w0123, blue) + dot(w45, blue_45));
 }
 
-// a0..a4 of the luminance.
+// a0..a4 of the luminance (Rec. 709).
 void luminance_shape(out vec4 shape, out float slope_v) {
-    shape = red + green + blue;
-    slope_v = red_green_45.x + red_green_45.z + blue_45.x;
+    shape = 0.2126 * red + 0.7152 * green + 0.0722 * blue;
+    slope_v = 0.2126 * red_green_45.x + 0.7152 * red_green_45.z + 0.0722 * blue_45.x;
 }

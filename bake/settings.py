@@ -1,0 +1,37 @@
+"""What a fan may be baked with: checked once, for the library and the command, before anything is loaded."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from impostor.errors import SettingsError
+from impostor.fan import MAX_SIZE, MIN_SIZE
+from impostor.views import layout_bases
+
+RING_ELEVATION_DEG = 15.0
+SAMPLES = (1, 2, 4)
+
+
+def camera_bases(
+    views: int, elevation_deg: float | None, layout: str, size: int, distance: float, samples: int | None
+) -> np.ndarray:
+    """Bases (views, 3, 3) of the cameras that `bake_fan` takes with these settings, which see there.
+
+    Raises
+    ------
+    SettingsError
+        A number or a choice out of range, or an elevation for something else than a ring.
+    """
+    elevation = RING_ELEVATION_DEG if elevation_deg is None else elevation_deg
+    bases = layout_bases(layout, views, math.radians(elevation))
+    if elevation_deg is not None and layout != "ring":
+        raise SettingsError("elevation", f"{elevation_deg:g} degrees of a {layout}; expected it of a ring only")
+    if not MIN_SIZE <= size <= MAX_SIZE:
+        raise SettingsError("size", f"{size} texels; expected {MIN_SIZE} to {MAX_SIZE}")
+    if not distance > 0:
+        raise SettingsError("distance", f"{distance:g} m; expected a distance above 0")
+    if samples is not None and samples not in SAMPLES:
+        raise SettingsError("samples", f"{samples}; expected {', '.join(map(str, SAMPLES[:-1]))} or {SAMPLES[-1]}")
+    return bases
