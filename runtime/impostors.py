@@ -34,7 +34,7 @@ QUAD_DTYPE = np.dtype(
 SPARED_TEXELS = 800
 # As triangle strips: corner of the covered rectangle; 1 where it is cut along y, 0 along x.
 RECTANGLE = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], "f4")
-OCTAGON = np.array([(x, y, along) for y, sides in ((0, (1, 0)), (1, (0, 1))) for along in sides for x in (0, 1)], "f4")
+OCTAGON = np.array([(x, y, along) for y, sides in ((0, (0, 1)), (1, (1, 0))) for along in sides for x in (0, 1)], "f4")
 ALPHA_CUTOFF = 1 / 32
 # A tile may be drawn this much larger than it is before the next finer mip level is relit.
 MAGNIFICATION = 1.2

@@ -14,7 +14,7 @@ from runtime.gpu import load_program, set_uniforms
 from runtime.relight import CORNERS
 from runtime.surface_textures import KINDS, PtmTextures
 
-MOST_TERMS = 16  # pictures that make up a flat surface's light, as the shader's array has it
+MOST_TERMS = 48  # pictures that make up a flat surface's light, as the shader's array has it
 # Relighting a PTM costs several frames of it lit pixel by pixel: it has to be drawn this often under the same lights
 # first. Lights that move in every frame are not worth a picture, also where a frame has several viewers.
 PATIENCE = 4
