@@ -28,6 +28,8 @@ class Design:
         The pseudo-inverse of `matrix`: coefficients are its product with the N values of a texel.
     condition : float
         Largest over smallest singular value of the terms in use.
+    parameters : ndarray of shape (N, 2), float64
+        (u, v) of every photograph.
     terms : tuple of int
         Which of the six are in use.
     """
@@ -35,6 +37,7 @@ class Design:
     matrix: NDArray[np.float64]
     solver: NDArray[np.float64]
     condition: float
+    parameters: NDArray[np.float64]
     terms: tuple[int, ...] = ALL_TERMS
 
 
@@ -83,7 +86,7 @@ def make_design(parameters: ArrayLike, terms: tuple[int, ...] = ALL_TERMS, where
         )
     solver = np.zeros((TERMS, len(uv)))
     solver[terms, :] = np.linalg.pinv(active)
-    return Design(matrix, solver, condition, terms)
+    return Design(matrix, solver, condition, uv, terms)
 
 
 def _why(uv: NDArray[np.float64]) -> str:

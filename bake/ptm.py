@@ -21,6 +21,7 @@ from bake.color_models import (
 )
 from bake.design import ALL_TERMS, Design, make_design
 from bake.photographs import Photographs, decoded
+from bake.robust import robust_coefficients
 from impostor.errors import SettingsError
 from impostor.files.lp_file import CaptureSet
 from impostor.ptm.polynomials import TERMS, Curve, Parameters, Polynomials
@@ -43,6 +44,7 @@ def fit_ptm(
     meaning: Parameters = "light",
     terms: tuple[int, ...] = ALL_TERMS,
     space: str = "ycbcr",
+    robust: bool = False,
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Polynomials:
@@ -65,6 +67,8 @@ def fit_ptm(
         Which of u², v², uv, u, v, 1 to fit; the rest is 0.
     space : {"ycbcr", "principal"}
         Of "lum": JPEG's YCbCr, or the axes along which these photographs vary most and least.
+    robust : bool
+        Weigh shadows and highlights less; see `robust_coefficients`. Takes many times as long.
     workers : int, optional
         Threads; as many as processors if not given.
     progress : callable, optional
@@ -95,7 +99,12 @@ def fit_ptm(
     if len(design.matrix) != len(photographs):
         raise SettingsError("lights", f"{len(design.matrix)} for {len(photographs)} photographs; expected one each")
     with ThreadPoolExecutor(worker_count(workers)) as pool:
-        planes = accumulate(photographs, design, curve, pool, progress)
+        if robust:
+            lights = unit_lights(design.parameters) if meaning == "light" else None
+            table = value_table(photographs, curve)
+            planes = robust_coefficients(photographs, design, lights, table, pool, progress)
+        else:
+            planes = accumulate(photographs, design, curve, pool, progress)
         return assemble(planes, photographs.size, design, format, space, curve, meaning, pool)
 
 
@@ -112,6 +121,12 @@ def light_parameters(capture: CaptureSet) -> NDArray[np.float64]:
         name = capture.photographs[behind[0]].name if capture.photographs else f"light {behind[0] + 1}"
         raise SettingsError(name, f"light's z is {capture.directions[behind[0], 2]:.3g}; expected above 0, in front")
     return capture.directions[:, :2]
+
+
+def unit_lights(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit vectors (N, 3) toward the lights of (lu, lv)."""
+    height = np.sqrt(np.clip(1 - (parameters**2).sum(axis=1), 0, 1))
+    return np.column_stack([parameters, height]).astype(np.float64)
 
 
 def check_choices(format: str, curve: str, space: str) -> None:

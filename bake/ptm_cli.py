@@ -79,6 +79,7 @@ def fit(
             meaning="series" if series else "view" if view else "light",
             terms=terms,
             space=space,
+            robust=robust,
             workers=workers,
             progress=progress,
         )

@@ -22,10 +22,11 @@ def main(fan_path: str, png_path: str) -> None:
     import numpy as np
 
     from impostor import Ground, load
+    from impostor.files.pictures import save_png
     from runtime import ImpostorRenderer
     from runtime.cameras import Camera
     from runtime.gpu import make_context
-    from runtime.offscreen import Offscreen, save_png
+    from runtime.offscreen import Offscreen
 
     done("import")
     fan = load(fan_path)

@@ -136,6 +136,13 @@ class Field:
         self.target.clear(BACKGROUND)
         self.renderer.draw(*self.shifted_matrices())
 
+    def impostors_and_shadows_moving(self) -> None:
+        """The same with their shadows."""
+        matrices = self.shifted_matrices()
+        self.target.clear(BACKGROUND)
+        self.renderer.draw_shadows(*matrices, self.placement.ground)
+        self.renderer.draw(*matrices)
+
     def shifted_matrices(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The viewer's matrices a millimetre or so beside where they were the last time."""
         self._shift = -self._shift

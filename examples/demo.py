@@ -29,10 +29,10 @@ from bake.fan import bake_fan
 from impostor import DirectionalLight, Fan, Gloss, ImpostorError, Model, load, load_model, save
 from impostor.cli import progress_bar
 from impostor.files.output import atomic_output
+from impostor.files.pictures import save_png
 from impostor.summary import write_contact_sheet
 from runtime.compare import Comparison, between_cameras, errors, side_by_side
 from runtime.gpu import make_context
-from runtime.offscreen import save_png
 from runtime.pictures import PictureSettings, draw_picture, orbit_camera
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -96,7 +96,18 @@ def make_app() -> typer.Typer:
         stage.load()(app)
     app.command("info")(info)
     app.command("validate")(validate)
+    app.add_typer(_ptm_app())
     return app
+
+
+def _ptm_app() -> typer.Typer:
+    from impostor import ptm_cli
+
+    ptm = typer.Typer(name="ptm", help="Polynomial texture maps: fit, draw, convert and measure them.")
+    for stage in sorted(entry_points(group="impostor.ptm_commands"), key=lambda stage: stage.name):
+        stage.load()(ptm)
+    ptm_cli.register(ptm)
+    return ptm
 
 
 def info(

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from impostor.fan import Fan
 from impostor.files.fan_file import read_fan, read_manifest
-from impostor.files.output import atomic_output
+from impostor.files.pictures import save_png
 from impostor.model import load_model
 from impostor.normal_code import palette
 
@@ -90,5 +89,4 @@ def contact_sheet(fan: Fan) -> NDArray[np.uint8]:
 
 def write_contact_sheet(fan: Fan, path: Path, force: bool = False) -> None:
     """Write `contact_sheet` as a PNG, all of it or nothing."""
-    with atomic_output(path, force=force) as temporary:
-        Image.fromarray(contact_sheet(fan)).save(temporary, format="PNG")
+    save_png(path, contact_sheet(fan), force=force)

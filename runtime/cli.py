@@ -73,7 +73,7 @@ def render(
     force: Force = False,
 ) -> None:
     """Draw a fan, or a mesh through the same camera and lights, as a PNG."""
-    from runtime.offscreen import save_png
+    from impostor.files.pictures import save_png
     from runtime.pictures import PictureSettings, draw_picture
 
     width, height = _size(size)
@@ -120,10 +120,10 @@ def compare(
 ) -> None:
     """Measure a fan against its mesh from cameras between the baked views."""
     from impostor.files.fan_file import read_fan
+    from impostor.files.pictures import save_png
     from impostor.model import load_model
     from runtime.compare import Comparison, side_by_side
     from runtime.compare import as_json as rows_as_json
-    from runtime.offscreen import save_png
     from runtime.renderer import DEFAULT_LIGHTS
 
     _check_method(method)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from impostor.errors import SettingsError
 from impostor.fan import Fan
 from impostor.lighting import Gloss
-from impostor.views import rotation_about_y
+from impostor.views import Views, ring_bases
 from runtime.checks import check_type, numbers
 
 
@@ -37,6 +37,7 @@ class Instances:
     positions : ndarray, (N, 3) float64
     yaws, scales : ndarray, (N,) float64
     visible : ndarray, (N,) bool
+    view_vectors : ViewVectors
 
     Raises
     ------
@@ -60,6 +61,7 @@ class Instances:
         count = len(self._positions)
         self._yaws, self._scales, self._visible = np.zeros(count), np.ones(count), np.ones(count, bool)
         self.yaws, self.scales = yaws, scales
+        self.view_vectors = ViewVectors(fan.views)
 
     @property
     def positions(self) -> NDArray[np.float64]:
@@ -177,16 +179,15 @@ class Viewer:
 
     def sees(self, points: NDArray[np.float64], radii: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether spheres around points (N, 3) with radii (N,) touch the view frustum."""
-        rows = self.clip_from_world
-        inside = np.ones(len(points), bool)
-        for plane in (rows[3] + rows[0], rows[3] - rows[0], rows[3] + rows[1], rows[3] - rows[1], rows[3] + rows[2]):
-            length = np.linalg.norm(plane[:3])
-            if length > 0:
-                inside &= points @ plane[:3] + plane[3] > -radii * length
-        return inside
+        x, y, z, w = self.clip_from_world
+        planes = np.stack([w + x, w - x, w + y, w - y, w + z])
+        reach = np.sqrt((planes[:, :3] ** 2).sum(axis=1))
+        # A plane at infinity has no direction, and everything on its inner side.
+        reach[reach == 0] = np.inf
+        return (planes[:, :3] @ points.T + planes[:, 3:] > -reach[:, None] * radii).all(axis=0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Quads:
     """What one viewer is shown of some instances: one fan view each, as a quad in the world.
 
@@ -196,33 +197,110 @@ class Quads:
         Which instances.
     view : ndarray, (N,) intp
         The nearest view of the fan.
+    vectors : ndarray, (7, N, 3) float64
+        That view's right, up and back as turned in the world, and the four below.
+    toward_eye : ndarray, (N, 3) float64
+        Unit vectors.
+    scale : ndarray, (N,) float64
+
+    Attributes
+    ----------
     basis : ndarray, (N, 3, 3) float64
-        That view's right, up and back as turned in the world; orthonormal.
+        Right, up and back; orthonormal.
     origin : ndarray, (N, 3) float64
         World position of the view's centre.
     center, right, up : ndarray, (N, 3) float64
         The quad: tile coordinates (x, y), in the view's metres, are drawn at `center + x right + y up`.
-    toward_eye : ndarray, (N, 3) float64
-        Unit vectors.
-    scale : ndarray, (N,) float64
     """
 
     index: NDArray[np.intp]
     view: NDArray[np.intp]
-    basis: NDArray[np.float64]
-    origin: NDArray[np.float64]
-    center: NDArray[np.float64]
-    right: NDArray[np.float64]
-    up: NDArray[np.float64]
+    vectors: NDArray[np.float64]
     toward_eye: NDArray[np.float64]
     scale: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.index)
 
+    @property
+    def basis(self) -> NDArray[np.float64]:
+        return self.vectors[:3].swapaxes(0, 1)
+
+    @property
+    def origin(self) -> NDArray[np.float64]:
+        return self.vectors[3]
+
+    @property
+    def center(self) -> NDArray[np.float64]:
+        return self.vectors[4]
+
+    @property
+    def right(self) -> NDArray[np.float64]:
+        return self.vectors[5]
+
+    @property
+    def up(self) -> NDArray[np.float64]:
+        return self.vectors[6]
+
     def take(self, which: NDArray[Any]) -> Quads:
         """Some of them, by index or mask."""
-        return Quads(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
+        if which.dtype == bool:
+            if which.all():
+                return self
+            which = np.flatnonzero(which)
+        parts = self.vectors.take(which, axis=1), self.toward_eye.take(which, axis=0)
+        return Quads(self.index[which], self.view[which], *parts, self.scale[which])
+
+
+class ViewVectors:
+    """A fan's views as many instances at once need them: found by direction, turned about +Y.
+
+    Parameters
+    ----------
+    views : Views
+
+    Attributes
+    ----------
+    middle : ndarray, (3,) float64
+        Of the views' centres.
+    reach : float
+        From there to the farthest corner of any quad.
+    """
+
+    def __init__(self, views: Views):
+        right, up, back = views.basis.swapaxes(0, 1)
+        offset, slope_right, slope_up = views.plane.T[..., None]
+        # A perspective camera's picture shrinks with the distance of the plane it falls on.
+        spread = 1 - offset / views.distance
+        center = views.center + offset * back
+        quad = center, spread * right + slope_right * back, spread * up + slope_up * back
+        vectors = np.stack([right, up, back, views.center, *quad])
+        # About +Y, z + ix turns as one complex number.
+        self._level, self._height = vectors[..., 2] + 1j * vectors[..., 0], vectors[..., 1].copy()
+        self.middle = views.center.mean(axis=0)
+        corners = [center + views.radius[:, None] * (quad[1] + side * quad[2]) for side in (-1, 1)]
+        corners += [center - views.radius[:, None] * (quad[1] + side * quad[2]) for side in (-1, 1)]
+        self.reach = float(np.linalg.norm(np.stack(corners) - self.middle, axis=-1).max())
+
+        ring = ring_bases(len(views), float(np.arcsin(np.clip(back[0, 1], -1, 1))))[:, 2]
+        self._views, self._is_ring = views, np.allclose(back, ring, rtol=0, atol=1e-9)
+
+    def nearest(self, x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.intp]:
+        """`Views.nearest` of directions (N,) in model space; of a ring without asking every view."""
+        if not self._is_ring:
+            return self._views.nearest(np.stack([x, y, z], axis=-1))
+        steps = np.arctan2(x, z) * (len(self._views) / (2 * np.pi))
+        return np.rint(steps).astype(np.intp) % len(self._views)
+
+    def turned(self, view: NDArray[np.intp], turn: NDArray[np.complex128]) -> NDArray[np.float64]:
+        """Vectors (7, N, 3) of some views, each turned by `turn` = exp(i yaw)."""
+        vectors = np.empty((len(self._level), len(view), 3))
+        # One after the other, temporaries stay small enough for the processor's cache.
+        for each, level, height in zip(vectors, self._level, self._height, strict=True):
+            turned = level.take(view)
+            turned *= turn
+            each[:, 0], each[:, 1], each[:, 2] = turned.imag, height.take(view), turned.real
+        return vectors
 
 
 def nearest_views(
@@ -244,15 +322,29 @@ def nearest_views(
     toward : ndarray, (N, 3) float64
         Unit vectors from the instance toward the eye, world space.
     """
-    rotation = rotation_about_y(instances.yaws[index])
-    middle = instances.fan.views.center.mean(axis=0)
-    where = instances.positions[index] + instances.scales[index, None] * (rotation @ middle)
-    toward = eye[:3] - eye[3] * where
-    toward /= np.maximum(np.linalg.norm(toward, axis=-1, keepdims=True), 1e-12)
-    return instances.fan.views.nearest(np.einsum("nji,nj->ni", rotation, toward)), toward
+    turn = np.exp(1j * instances.yaws[index])
+    return _nearest(instances, eye, turn, _middles(instances, index, turn))
 
 
-def quads_toward(instances: Instances, eye: NDArray[np.float64]) -> Quads:
+def _middles(instances: Instances, index: NDArray[np.intp], turn: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Where (N, 3) the middles of the fan's views stand in the world."""
+    x, y, z = instances.view_vectors.middle
+    level, scale = (z + 1j * x) * turn, instances.scales[index]
+    middles = instances.positions[index]
+    middles += np.stack([scale * level.imag, scale * y, scale * level.real], axis=-1)
+    return middles
+
+
+def _nearest(
+    instances: Instances, eye: NDArray[np.float64], turn: NDArray[np.complex128], middles: NDArray[np.float64]
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    toward = eye[:3] - eye[3] * middles
+    toward /= np.maximum(np.sqrt(np.einsum("ni,ni->n", toward, toward)), 1e-12)[:, None]
+    level = (toward[:, 2] + 1j * toward[:, 0]) * turn.conj()
+    return instances.view_vectors.nearest(level.imag, toward[:, 1], level.real), toward
+
+
+def quads_toward(instances: Instances, eye: NDArray[np.float64], viewer: Viewer | None = None) -> Quads:
     """The nearest view of every visible instance, set up in the world (the paper's figure 2).
 
     The quad lies in the plane that follows the surface its view shows, turned with the instance: seen from the view's
@@ -264,21 +356,23 @@ def quads_toward(instances: Instances, eye: NDArray[np.float64]) -> Quads:
     instances : Instances
     eye : ndarray, (4,) float64
         Homogeneous, `Viewer.eye`.
+    viewer : Viewer, optional
+        Leave out what is certainly beside the picture.
 
     Returns
     -------
     Quads
     """
     # Not a number in any of them makes the sum none either.
-    finite = np.isfinite(instances.positions.sum(axis=1) + instances.yaws + instances.scales)
-    views, index = instances.fan.views, np.flatnonzero(instances.visible & finite & (instances.scales > 0))
-    view, toward = nearest_views(instances, eye, index)
-    rotation, scale = rotation_about_y(instances.yaws[index]), instances.scales[index]
-    origin = instances.positions[index] + scale[:, None] * np.einsum("nij,nj->ni", rotation, views.center[view])
-    basis = np.einsum("nij,nkj->nki", rotation, views.basis[view])
-    offset, slope_right, slope_up = views.plane[view].T[..., None] * scale[:, None]
-    right, up, back = basis[:, 0] * scale[:, None], basis[:, 1] * scale[:, None], basis[:, 2]
-    # A perspective camera's picture shrinks with the distance of the plane it falls on.
-    spread = 1 - views.plane[view, :1] / views.distance
-    quad = origin + offset * back, spread * right + slope_right * back, spread * up + slope_up * back
-    return Quads(index, view, basis, origin, *quad, toward, scale)
+    finite = np.isfinite(instances.positions @ np.ones(3) + instances.yaws + instances.scales)
+    index = np.flatnonzero(instances.visible & finite & (instances.scales > 0))
+    turn = np.exp(1j * instances.yaws[index])
+    middles = _middles(instances, index, turn)
+    if viewer is not None:
+        seen = np.flatnonzero(viewer.sees(middles, instances.view_vectors.reach * instances.scales[index]))
+        index, turn, middles = index[seen], turn[seen], middles[seen]
+    view, toward = _nearest(instances, eye, turn, middles)
+    vectors, scale = instances.view_vectors.turned(view, turn), instances.scales[index]
+    vectors[3:] *= scale[:, None]
+    vectors[3:5] += instances.positions[index]
+    return Quads(index, view, vectors, toward, scale)

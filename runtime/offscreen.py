@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from impostor.errors import GpuError, SettingsError
-from impostor.files.output import atomic_output
 from runtime.gpu import check_texture_size
 
 
@@ -85,15 +81,3 @@ class Offscreen:
             (self._ctx.screen or self._ctx.detect_framebuffer(0)).use()
         for resource in (self.framebuffer, self._color, self._depth):
             resource.release()
-
-
-def save_png(path: str | Path, pixels: NDArray[np.uint8], *, force: bool = False) -> None:
-    """Write (H, W), (H, W, 3) or (H, W, 4) uint8 pixels as a PNG, all of it or nothing.
-
-    Raises
-    ------
-    OutputError
-        The file exists and `force` is not set, or it cannot be written.
-    """
-    with atomic_output(path, force=force) as temporary:
-        Image.fromarray(np.ascontiguousarray(pixels)).save(temporary, format="PNG")

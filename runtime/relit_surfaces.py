@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from runtime.gl_state import set_state
+from runtime.gl_state import _call, set_state
 from runtime.gpu import load_program, set_uniforms
 from runtime.relight import CORNERS
 from runtime.surface_textures import KINDS, PtmTextures
@@ -19,6 +19,8 @@ MOST_TERMS = 48  # pictures that make up a flat surface's light, as the shader's
 # first. Lights that move in every frame are not worth a picture, also where a frame has several viewers.
 PATIENCE = 4
 MOST_TEXELS = 1 << 26  # of all pictures; the rest is lit pixel by pixel
+
+_FRAMEBUFFER, _COLOR_ATTACHMENT0, _TEXTURE_2D = 0x8D40, 0x8CE0, 0x0DE1
 
 Key = tuple[int, bytes]
 
@@ -34,6 +36,14 @@ class RelitPicture:
         self.texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
         self.texture.anisotropy = ptm.anisotropy
         self.target = ctx.framebuffer([self.texture])
+
+    def use_level(self, level: int) -> None:
+        """Bind the framebuffer, to draw into one mip level."""
+        width, height = (max(side >> level, 1) for side in self.texture.size)
+        self.target.viewport = (0, 0, width, height)
+        self.target.use()
+        # moderngl makes framebuffers on the finest level only.
+        _call("glFramebufferTexture2D", _FRAMEBUFFER, _COLOR_ATTACHMENT0, _TEXTURE_2D, self.texture.glo, level)
 
     @property
     def texels(self) -> int:
@@ -121,12 +131,14 @@ class RelitPictures:
 
     def _relight(self, ptm: PtmTextures, terms: NDArray[np.float32]) -> RelitPicture:
         picture, array = RelitPicture(self._ctx, ptm), self._arrays[ptm.kind]
-        picture.target.use()
-        set_state()
         ptm.bind(array.program, repeat=False)
         bind_terms(array.program, terms)
-        array.render(moderngl.TRIANGLE_STRIP)
-        picture.texture.build_mipmaps()
+        # Each level from the coefficients' own: it shows what would be seen without a picture.
+        for level in range(max(ptm.size).bit_length()):
+            picture.use_level(level)
+            set_state()
+            set_uniforms(array.program, level=level)
+            array.render(moderngl.TRIANGLE_STRIP)
         return picture
 
     def _free_all_but(self, keys: Set[Key]) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
 from impostor.errors import SettingsError
+from impostor.ptm.mipmaps import halve
 from impostor.ptm.quantise import Ptm
 from impostor.ptm_shading import AMBIENT_WEIGHTS
 from runtime.gpu import check_texture_size, set_uniforms
@@ -46,46 +48,35 @@ class PtmTextures:
     def __init__(self, ctx: moderngl.Context, ptm: Ptm, anisotropy: float):
         if ptm.parameters != "light":
             raise SettingsError("PTM surface", f"parameters are {ptm.parameters!r}; expected a PTM of light directions")
-        self.ptm = ptm
-        height, width = ptm.coefficients.shape[:2]
-        check_texture_size(ctx, "PTM", width, height)
-        self.size = width, height
-        self.kind = "lrgb" if ptm.color is not None else "rgb"
-        self.anisotropy = min(anisotropy, ctx.max_anisotropy)
-        self.textures: list[moderngl.Texture] = []
-        if self.kind == "lrgb":
-            self._upload_lrgb(ctx)
+        self.ptm, self.size = ptm, ptm.size
+        check_texture_size(ctx, "PTM", *self.size)
+        self.kind = "lrgb" if ptm.format == "LRGB" else "rgb"
+        self.anisotropy = anisotropy
+        if ptm.format == "LRGB":
+            packed = _packed_lrgb(ptm)
+            self._low, self._scale = _span(packed)
+            levels = _lrgb_levels(packed)
+            self.textures = self._upload(ctx, 2, (_codes(texels, self._low, self._scale) for texels in levels))
         else:
-            self._upload_rgb(ctx)
-        for texture in self.textures:
-            texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-            texture.anisotropy = self.anisotropy
+            codes, low, scale = (ptm.coefficients, _low(ptm), ptm.scale) if ptm.format == "RGB" else _rgb_from_lum(ptm)
+            self._low, self._scale = low[PAIRS], scale[PAIRS]
+            self.textures = self._upload(ctx, 5, _rgb_levels(codes))
 
-    def _upload_lrgb(self, ctx: moderngl.Context) -> None:
-        packed = _packed_lrgb(self.ptm)
-        self._low, self._scale = _ranges(packed)
-        for level, texels in enumerate(_levels(packed)):
-            codes = _codes(texels, self._low, self._scale)
-            if level == 0:
-                self.textures = [_texture(ctx, np.ascontiguousarray(codes[..., n : n + 4])) for n in (0, 4)]
-            else:
-                for texture, n in zip(self.textures, (0, 4), strict=True):
-                    texture.write(np.ascontiguousarray(codes[..., n : n + 4]).tobytes(), level=level)
-
-    def _upload_rgb(self, ctx: moderngl.Context) -> None:
-        ptm = self.ptm
-        if ptm.chroma is None:
-            codes, scale, low = ptm.coefficients, ptm.scale, -ptm.bias * ptm.scale / 255
-        else:
-            coefficients = _rgb_from_lum(ptm)
-            low, scale = _ranges(coefficients)
-            codes = _codes(coefficients, low, scale)
-        self._low, self._scale = low[PAIRS], scale[PAIRS]
-        red, green, blue = np.moveaxis(codes, 2, 0)
-        blue_rest = np.pad(blue[..., 4:], ((0, 0), (0, 0), (0, 2)))
-        rest = np.concatenate([red[..., 4:], green[..., 4:]], axis=-1)
-        for channels in (red[..., :4], rest, green[..., :4], blue[..., :4], blue_rest):
-            self.textures.append(_texture(ctx, np.ascontiguousarray(channels)))
+    def _upload(
+        self, ctx: moderngl.Context, count: int, levels: Iterator[NDArray[np.unsignedinteger]]
+    ) -> list[moderngl.Texture]:
+        """Textures of four channels each from levels (H, W, 4 * count)."""
+        first = next(levels)
+        dtype = "f1" if first.dtype == np.uint8 else "nu2"
+        textures = [ctx.texture(self.size, 4, _channels(first, n).tobytes(), dtype=dtype) for n in range(count)]
+        for texture in textures:
+            texture.build_mipmaps()
+            texture.filter, texture.anisotropy = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR), self.anisotropy
+        for level, texels in enumerate(levels, 1):
+            # The driver's own levels are rounded anew on each, and not always to the nearest.
+            for n, texture in enumerate(textures):
+                texture.write(_channels(texels, n).tobytes(), level=level)
+        return textures
 
     def bind(self, program: moderngl.Program, *, repeat: bool) -> None:
         """Bind the textures from unit 0 on, and give the program their scale."""
@@ -115,60 +106,63 @@ def _packed_lrgb(ptm: Ptm) -> NDArray[np.float32]:
     return packed
 
 
-def _rgb_from_lum(ptm: Ptm) -> NDArray[np.float32]:
-    """(H, W, 3, 6): a LUM PTM as three polynomials."""
-    polynomials = ptm.polynomials()
-    assert polynomials.chroma is not None and polynomials.rgb_from_luma is not None
-    matrix = polynomials.rgb_from_luma
-    coefficients = polynomials.coefficients * matrix[:, :1].astype(np.float32)
-    coefficients[..., 5] += polynomials.chroma @ matrix[:, 1:3].T + matrix[:, 3]
-    return coefficients
+def _lrgb_levels(texels: NDArray[np.float32]) -> Iterator[NDArray[np.float32]]:
+    """Mip levels of a packed LRGB PTM: means of the polynomials; of the colours, the brighter ones giving more.
 
-
-def _levels(texels: NDArray[np.float32]) -> Iterator[NDArray[np.float32]]:
-    """Mip levels of a packed LRGB PTM; the brighter texels give more of the colour."""
+    `impostor.ptm.mipmaps` finds the nearest product of a polynomial and a colour instead, in five times the time.
+    """
     yield texels
     while max(texels.shape[:2]) > 1:
         weight = np.maximum(texels[..., :6] @ AMBIENT_WEIGHTS.astype(np.float32), 1e-6)[..., None]
-        colored = np.concatenate([texels[..., :6], texels[..., 6:] * weight, weight], axis=-1)
-        halved = _halved(_halved(colored, 0), 1)
+        halved = halve(np.concatenate([texels[..., :6], texels[..., 6:] * weight, weight], axis=-1))
         texels = halved[..., :8]
         texels[..., 6:] /= halved[..., 8:]
         yield texels
 
 
-def _halved(texels: NDArray[np.float32], axis: int) -> NDArray[np.float32]:
-    """Means over an axis of half as many equal stretches."""
-    texels = np.moveaxis(texels, axis, 0)
-    size = len(texels)
-    if size == 1:
-        return np.moveaxis(texels, 0, axis)
-    half = size // 2
-    if size % 2 == 0:
-        halved = (texels[0::2] + texels[1::2]) * np.float32(0.5)
-    else:
-        at = np.arange(half, dtype=np.float32).reshape(-1, *[1] * (texels.ndim - 1))
-        halved = ((half - at) * texels[0:-1:2] + half * texels[1::2] + (at + 1) * texels[2::2]) / np.float32(size)
-    return np.moveaxis(halved, 0, axis)
+def _low(ptm: Ptm) -> NDArray[np.float64]:
+    """What a coefficient of byte 0 is worth."""
+    return -ptm.bias * ptm.scale / 255
 
 
-def _ranges(texels: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Least value and span of every last-axis channel."""
+def _rgb_from_lum(ptm: Ptm) -> tuple[NDArray[np.uint16], NDArray[np.float64], NDArray[np.float64]]:
+    """A LUM PTM as three polynomials: codes (H, W, 3, 6), and what code 0 and the whole span are worth."""
+    polynomials = ptm.polynomials()
+    assert polynomials.chroma is not None and polynomials.rgb_from_luma is not None
+    matrix = polynomials.rgb_from_luma
+    coefficients = polynomials.coefficients * matrix[:, :1].astype(np.float32)
+    coefficients[..., 5] += polynomials.chroma @ matrix[:, 1:3].T + matrix[:, 3]
+    low, span = _span(coefficients)
+    return _codes(coefficients, low, span), low, span
+
+
+def _rgb_levels(codes: NDArray[np.unsignedinteger]) -> Iterator[NDArray[np.unsignedinteger]]:
+    """Mip levels (H, W, 20) of codes (H, W, 3, 6), in the order of `ptm_rgb.glsl`."""
+    red, green, blue = np.moveaxis(codes, 2, 0)
+    order = (red[..., :4], red[..., 4:], green[..., 4:], green[..., :4], blue[..., :4], blue[..., 4:], blue[..., 4:])
+    first = np.concatenate(order, axis=-1)
+    yield first
+    means = first
+    while max(means.shape[:2]) > 1:
+        # A part at a time: in floats the first level would be four times as large.
+        means = np.concatenate([halve(_channels(means, n).astype(np.float32)) for n in range(5)], axis=-1)
+        yield np.rint(means).astype(codes.dtype)
+
+
+def _channels(texels: NDArray[Any], n: int) -> NDArray[Any]:
+    """Those of texture n."""
+    return np.ascontiguousarray(texels[..., 4 * n : 4 * n + 4])
+
+
+def _span(texels: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Least value of each channel, and from there to the greatest."""
     flat = texels.reshape(-1, texels.shape[-1])
     low, high = flat.min(axis=0).astype(float), flat.max(axis=0).astype(float)
     return low, np.maximum(high - low, 1e-6)
 
 
-def _codes(texels: NDArray[np.float32], low: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.uint16]:
+def _codes(texels: NDArray[np.float32], low: NDArray[np.float64], span: NDArray[np.float64]) -> NDArray[np.uint16]:
     """16-bit fractions of the span."""
-    codes = (texels - low.astype(np.float32)) * (65535 / scale).astype(np.float32)
+    codes = (texels - low.astype(np.float32)) * (65535 / span).astype(np.float32)
     codes += np.float32(0.5)
     return np.clip(codes, 0, 65535, out=codes).astype(np.uint16)
-
-
-def _texture(ctx: moderngl.Context, texels: NDArray[np.unsignedinteger]) -> moderngl.Texture:
-    height, width, channels = texels.shape
-    dtype = "f1" if texels.dtype == np.uint8 else "nu2"
-    texture = ctx.texture((width, height), channels, texels.tobytes(), dtype=dtype)
-    texture.build_mipmaps()
-    return texture

@@ -98,18 +98,22 @@ class _Tokens:
         return found[1]
 
     def numbers(self, name: str, count: int) -> NDArray[np.float64]:
-        words = [self.word(f"{name} {index}" if count > 1 else name) for index in range(count)]
-        for word in words:
+        values = []
+        for place in _places(name, count):
+            word = self.word(place)
             if not _NUMBER.fullmatch(word) or not np.isfinite(float(word)):
-                raise self.error(name, repr(word.decode("ascii")), "a number")
-        return np.array([float(word) for word in words])
+                raise self.error(place, word.decode("ascii"), "a number")
+            values.append(float(word))
+        return np.array(values)
 
     def integers(self, name: str, count: int, least: int, most: int) -> list[int]:
-        words = [self.word(f"{name} {index}" if count > 1 else name) for index in range(count)]
-        for word in words:
+        values = []
+        for place in _places(name, count):
+            word = self.word(place)
             if not _INTEGER.fullmatch(word) or not least <= int(word) <= most:
-                raise self.error(name, word.decode("ascii"), f"a whole number from {least} to {most}")
-        return [int(word) for word in words]
+                raise self.error(place, word.decode("ascii"), f"a whole number from {least} to {most}")
+            values.append(int(word))
+        return values
 
     def end_line(self) -> None:
         found = _LINE_END.match(self.data, self.position)
@@ -119,6 +123,10 @@ class _Tokens:
 
     def error(self, name: str, value: str, expected: str) -> PtmFileError:
         return PtmFileError(self.path, f"header: {name}: {value[:60]}; expected {expected}")
+
+
+def _places(name: str, count: int) -> list[str]:
+    return [name] if count == 1 else [f"{name} {index}" for index in range(count)]
 
 
 def parse_header(data: bytes, path: str | PathLike[str]) -> Header:
@@ -146,7 +154,7 @@ def parse_header(data: bytes, path: str | PathLike[str]) -> Header:
         raise PtmFileError(path, f"format {name}: {REFUSED[kind]} are not read; expected {_readable()}")
     if not name.startswith(PREFIX) or kind not in TEXEL_BYTES | PLANES:
         raise PtmFileError(path, f"format {name[:60]}; expected {_readable()}")
-    width, height = tokens.integers("size", 2, 1, LARGEST_SIDE)
+    (width,), (height,) = (tokens.integers(name, 1, 1, LARGEST_SIDE) for name in ("width", "height"))
     scale = tokens.numbers("scale", TERMS)
     if not ((scale >= 0) & (scale <= LARGEST_SCALE)).all():
         raise tokens.error("scale", str(scale.tolist()), f"numbers from 0 to {LARGEST_SCALE:g}")

@@ -127,9 +127,11 @@ def _table(
     """Entries (K, D) and the code (N,) of every vector (N, D)."""
     points = vectors @ metric
     # Drawing texels by weight is what weighs them in the means.
-    sample = points[random.choice(len(points), SAMPLE, p=(weights + 1e-12) / (weights + 1e-12).sum())]
-    centers = random.permutation(np.unique(sample, axis=0))[:entries]
-    if len(centers) == entries:
+    chances = (weights + 1e-12) / (weights + 1e-12).sum()
+    sample = points[random.choice(len(points), min(SAMPLE, 4 * len(points)), p=chances)]
+    distinct = np.unique(points if len(points) <= SAMPLE else sample, axis=0)
+    centers = random.permutation(distinct)[:entries]
+    if len(centers) < len(distinct):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of an entry that no texel of the sample is nearest to
             centers, _ = kmeans2(sample, centers, ITERATIONS, minit="matrix")

@@ -5,9 +5,10 @@ import pytest
 
 from impostor.errors import SettingsError
 from impostor.lighting import Gloss
-from impostor.views import direction, rotation_about_y
+from impostor.views import direction, frame, layout_bases, rotation_about_y
 from runtime import Instances
-from runtime.instances import nearest_views, quads_toward
+from runtime.cameras import Camera
+from runtime.instances import Viewer, ViewVectors, nearest_views, quads_toward
 from tests.solids import Sphere, solid_fan
 
 FAN = solid_fan(Sphere((0.5, 0.2, 0.0)), views=8, size=16, elevation_deg=10, slopes=(0.1, 0.2, -0.3))
@@ -115,6 +116,16 @@ def test_a_turned_copy_shows_the_view_that_its_turn_brings_round():
     np.testing.assert_allclose(toward, np.tile(direction(0.1, 0.3), (8, 1)))
 
 
+@pytest.mark.parametrize("layout", ["ring", "hemisphere", "sphere"])
+@pytest.mark.parametrize("count", [1, 2, 7, 96])
+def test_the_nearest_view_is_the_one_that_the_views_name(layout, count):
+    views = frame(layout_bases(layout, count, 0.3), np.array([[-1.0, -1, -1], [1, 1, 1]]), 16)
+    toward = np.random.default_rng(0).normal(size=(5000, 3))
+    found = ViewVectors(views).nearest(*toward.T)
+    cosines = np.einsum("ni,ni->n", toward, views.basis[found, 2])
+    np.testing.assert_allclose(cosines, (toward @ views.basis[:, 2].T).max(axis=1), rtol=0, atol=1e-12)
+
+
 def test_each_copy_looks_at_the_eye_from_where_it_stands():
     copies = Instances(FAN, [(0, 0, -50), (50, 0, 0), (-50, 0, 0), (0, 0, 50)])
     view, toward = nearest_views(copies, np.array([0, 0, 0, 1.0]), np.arange(4))
@@ -150,6 +161,35 @@ def test_a_point_of_the_views_plane_is_drawn_where_it_is():
     model = view.unproject([x, y, offset + slope_right * x + slope_up * y])
     expected = np.array([1, 2, 3]) + 2.0 * rotation_about_y(0.4) @ model
     np.testing.assert_allclose(quad.center[0] + x * quad.right[0] + y * quad.up[0], expected)
+
+
+@pytest.mark.parametrize("fan", [FAN, NEAR], ids=["orthographic", "perspective"])
+def test_what_is_beside_the_picture_is_left_out_and_nothing_else(fan):
+    random = np.random.default_rng(0)
+    copies = Instances(
+        fan, random.uniform(-30, 30, (4000, 3)), random.uniform(0, 7, 4000), random.uniform(0.2, 3, 4000)
+    )
+    viewer = Viewer.from_matrices(*Camera.perspective((2, 3, 9), (0, 1, 0), 40, 1.5, 1, 25).matrices, (0, 0, 90, 60))
+    every, seen = quads_toward(copies, viewer.eye), quads_toward(copies, viewer.eye, viewer)
+    corners = every.center[:, None] + fan.views.radius[0] * np.stack(
+        [x * every.right + y * every.up for x in (-1, 1) for y in (-1, 1)], axis=1
+    )
+    clip = corners @ viewer.clip_from_world[:, :3].T + viewer.clip_from_world[:, 3]
+    inside = (np.abs(clip[..., :2]) < clip[..., 3:]).all(axis=-1) & (clip[..., 2] > -clip[..., 3])
+    inside = inside.any(axis=1)
+    assert 50 < inside.sum() <= len(seen) < 1000
+    assert set(np.flatnonzero(inside)) <= set(seen.index)
+    chosen = every.take(seen.index)
+    for name in ("index", "view", "basis", "origin", "center", "right", "up", "toward_eye", "scale"):
+        np.testing.assert_array_equal(getattr(seen, name), getattr(chosen, name))
+
+
+def test_some_quads_by_mask_are_those_by_index():
+    quads = quads_toward(Instances(FAN, np.arange(12.0).reshape(4, 3)), np.array([0, 0, 1.0, 0]))
+    mask = np.array([True, False, True, False])
+    for some in (quads.take(mask), quads.take(np.flatnonzero(mask))):
+        assert (some.index.tolist(), some.basis.shape) == ([0, 2], (2, 3, 3))
+        np.testing.assert_array_equal(some.center, quads.center[mask])
 
 
 def test_invisible_copies_show_nothing():

@@ -5,10 +5,11 @@ import pytest
 from PIL import Image
 
 from impostor.errors import GpuError, OutputError, SettingsError
+from impostor.files.pictures import save_png
 from impostor.shadow_projection import Ground
 from runtime.cameras import Camera
 from runtime.grounds import GroundSurface
-from runtime.offscreen import Offscreen, save_png
+from runtime.offscreen import Offscreen
 
 LEVEL = Ground((0, 1, 0), 0.0)
 

@@ -16,9 +16,9 @@ void fetch_ptm(vec2 uv) {
     hold(texture(ptm_0, uv), texture(ptm_1, uv), texture(ptm_2, uv), texture(ptm_3, uv), texture(ptm_4, uv));
 }
 
-void fetch_texel(ivec2 texel) {
-    hold(texelFetch(ptm_0, texel, 0), texelFetch(ptm_1, texel, 0), texelFetch(ptm_2, texel, 0),
-         texelFetch(ptm_3, texel, 0), texelFetch(ptm_4, texel, 0));
+void fetch_texel(ivec2 texel, int level) {
+    hold(texelFetch(ptm_0, texel, level), texelFetch(ptm_1, texel, level), texelFetch(ptm_2, texel, level),
+         texelFetch(ptm_3, texel, level), texelFetch(ptm_4, texel, level));
 }
 
 vec3 ptm_value(vec4 w0123, vec2 w45) {

@@ -1,0 +1,198 @@
+"""Photographs of a relief that exists only as numbers: with its own shadows, and light that bounces from part to part."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import ndimage, sparse
+
+from impostor.errors import SettingsError
+
+LARGEST_SIDE = 2048
+AZIMUTHS = 24  # directions in which a texel looks for others that light it
+LIGHT_RADIUS = math.radians(0.5)  # of the lamps: what makes the penumbra
+Floats = NDArray[np.floating[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class Relief:
+    """A surface above the picture's plane, seen from straight above.
+
+    Parameters
+    ----------
+    heights : ndarray of shape (H, W), float64
+        Toward the camera, in texels. Around the picture lies a floor at the lowest height.
+    albedo : ndarray of shape (H, W, 3), float64
+        Linear, 0..1; 0 where there is nothing to be seen.
+    gloss : float
+        Strength of a white highlight: what it adds where it is strongest, of a light at normal incidence.
+    shininess : float
+        Exponent of the highlight (Blinn-Phong).
+
+    Raises
+    ------
+    SettingsError
+        Shapes that do not fit together, or a value out of range.
+    """
+
+    heights: NDArray[np.float64]
+    albedo: NDArray[np.float64]
+    gloss: float = 0.0
+    shininess: float = 60.0
+
+    def __post_init__(self):
+        shape = self.heights.shape
+        if len(shape) != 2 or not 2 <= min(shape) <= max(shape) <= LARGEST_SIDE:
+            raise SettingsError("relief", f"heights of shape {shape}; expected sides of 2 to {LARGEST_SIDE}")
+        if self.albedo.shape != (*shape, 3):
+            raise SettingsError("relief", f"albedo of shape {self.albedo.shape}; expected {(*shape, 3)}")
+        if not (np.isfinite(self.heights).all() and (self.albedo >= 0).all() and (self.albedo <= 1).all()):
+            raise SettingsError("relief", "a height is not finite, or an albedo outside 0..1")
+        if not (0 <= self.gloss < math.inf and 0 < self.shininess < math.inf):
+            raise SettingsError("relief", f"gloss {self.gloss:g}, shininess {self.shininess:g}; expected positive")
+
+    def normals(self) -> NDArray[np.float64]:
+        """Unit normals (H, W, 3): x right, y up, z to the camera."""
+        down, right = np.gradient(self.heights)
+        normals = np.stack([-right, down, np.ones_like(right)], axis=-1)
+        return normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+
+
+def photograph(
+    relief: Relief,
+    lights: ArrayLike,
+    *,
+    bounce: bool = True,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> NDArray[np.float32]:
+    """The relief under one light after another.
+
+    Parameters
+    ----------
+    relief : Relief
+    lights : array_like of shape (N, 3), float
+        Unit vectors toward far lights, z above 0: x right, y up. A white texel that faces its light is white.
+    bounce : bool
+        Add the light that reaches a texel from the others, once reflected.
+    progress : callable
+        Called with lights done and lights in all.
+
+    Returns
+    -------
+    ndarray of shape (N, H, W, 3), float32
+        Linear light; may pass 1.
+
+    Raises
+    ------
+    SettingsError
+        A light that is not above the surface.
+    """
+    directions = np.asarray(lights, np.float64)
+    if directions.ndim != 2 or directions.shape[1] != 3 or not (directions[:, 2] > 0).all():
+        raise SettingsError("lights", f"of shape {directions.shape}; expected (N, 3), each z above 0")
+    normals = relief.normals()
+    exchange = form_factors(relief) if bounce else None
+    pictures = np.empty((len(directions), *relief.albedo.shape), np.float32)
+    for number, light in enumerate(directions):
+        visible = visibility(relief.heights, light)
+        direct = relief.albedo * (visible * np.maximum(normals @ light, 0))[..., None]
+        pictures[number] = direct
+        if exchange is not None:
+            received = exchange @ direct.reshape(-1, 3)
+            pictures[number] += relief.albedo * received.reshape(direct.shape)
+        if relief.gloss:
+            half = light + [0, 0, 1]
+            shine = np.maximum(normals @ (half / np.linalg.norm(half)), 0) ** relief.shininess
+            pictures[number] += (relief.gloss * visible * shine * (relief.albedo.max(axis=-1) > 0))[..., None]
+        progress(number + 1, len(directions))
+    return pictures
+
+
+def visibility(heights: NDArray[np.float64], light: ArrayLike) -> NDArray[np.float64]:
+    """How much of a light each texel sees.
+
+    Parameters
+    ----------
+    heights : ndarray of shape (H, W), float64
+    light : array_like of shape (3,), float
+        Unit vector.
+
+    Returns
+    -------
+    ndarray of shape (H, W), float64
+        0 in the shadow of another part of the surface, 1 outside, between them in the penumbra.
+    """
+    x, y, z = np.asarray(light, np.float64).tolist()
+    across = math.hypot(x, y)
+    if across < 1e-9:
+        return np.ones(heights.shape)
+    elevation = math.atan2(z, across)
+    # Above this slope toward the light all light is lost: what is lower than that everywhere needs no look.
+    least = math.tan(max(elevation - LIGHT_RADIUS, math.radians(0.1)))
+    steps = min(math.ceil(np.ptp(heights) / least), math.ceil(math.hypot(*heights.shape)))
+    horizon = np.full(heights.shape, -np.inf)
+    for step in range(1, steps + 1):
+        np.maximum(horizon, (_shifted(heights, x / across * step, y / across * step) - heights) / step, out=horizon)
+    return np.clip((elevation - np.arctan(horizon)) / (2 * LIGHT_RADIUS) + 0.5, 0, 1)
+
+
+def form_factors(relief: Relief) -> sparse.csr_matrix:
+    """Which share of what reaches each texel comes from each other one.
+
+    Parameters
+    ----------
+    relief : Relief
+
+    Returns
+    -------
+    sparse matrix of shape (H * W, H * W)
+        Its product with the texels' reflected light is the light that they receive, in the unit in which a light at
+        normal incidence gives 1.
+
+    Notes
+    -----
+    In each of 24 azimuths a texel's horizon rises from its tangent plane, step by step outward. Each step that lifts
+    it shows a piece of surface between the old horizon and the new, over which the cosine is integrated exactly.
+    """
+    heights, normals = relief.heights, relief.normals()
+    index = np.arange(heights.size).reshape(heights.shape)
+    rows, columns, shares = [], [], []
+    for azimuth in (np.arange(AZIMUTHS) + 0.5) * 2 * np.pi / AZIMUTHS:
+        x, y = math.cos(azimuth), math.sin(azimuth)
+        along, up = normals[..., 0] * x + normals[..., 1] * y, normals[..., 2]
+        horizon = np.arctan2(-along, up)  # the tangent plane
+        for step in range(1, math.ceil(math.hypot(*heights.shape))):
+            if (np.arctan((heights.max() - heights) / step) <= horizon).all():
+                break
+            row, column = _rounded(heights.shape, x * step, y * step)
+            inside = (row >= 0) & (row < heights.shape[0]) & (column >= 0) & (column < heights.shape[1])
+            angle = np.arctan((_shifted(heights, x * step, y * step) - heights) / step)
+            seen = (angle > horizon) & inside
+            if not seen.any():
+                continue
+            low, high = horizon[seen], angle[seen]
+            flat = along[seen] * ((high - low) / 2 + (np.sin(2 * high) - np.sin(2 * low)) / 4)
+            steep = up[seen] * (np.sin(high) ** 2 - np.sin(low) ** 2) / 2
+            rows.append(index[seen])
+            columns.append(index[row[seen], column[seen]])
+            shares.append((flat + steep) * 2 / AZIMUTHS)
+            horizon[seen] = high
+    if not rows:
+        return sparse.csr_matrix((heights.size, heights.size))
+    entries = np.concatenate(shares), (np.concatenate(rows), np.concatenate(columns))
+    return sparse.csr_matrix(entries, shape=(heights.size, heights.size))
+
+
+def _shifted(heights: NDArray[np.float64], right: float, up: float) -> NDArray[np.float64]:
+    """The heights a step away from every texel; the floor outside the picture."""
+    return ndimage.shift(heights, (up, -right), order=1, mode="constant", cval=float(heights.min()))
+
+
+def _rounded(shape: tuple[int, ...], right: float, up: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    row, column = np.indices(shape)
+    return row - round(up), column + round(right)

@@ -1,0 +1,273 @@
+"""`impostor ptm`: info, render, convert, relight-video, synthesise."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+
+import typer
+
+from impostor.errors import SettingsError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from impostor.ptm import Polynomials, Ptm
+
+FIGURES = 4
+OUTPUTS = ("lit", "normal", "albedo")
+
+PtmFile = Annotated[Path, typer.Argument(metavar="PTM", help="A .ptm file.")]
+Jpeg = Annotated[int | None, typer.Option(metavar="QUALITY", help="Compress the planes; 1 to 100.")]
+NoPrediction = Annotated[
+    bool, typer.Option("--no-prediction", help="No plane as a difference from another: for viewers that read none.")
+]
+Gain = Annotated[float, typer.Option(help="Diffuse gain: how much more strongly texels answer to the light.")]
+Specular = Annotated[
+    str | None, typer.Option(metavar="STRENGTH,EXPONENT", help="Add highlights on the PTM's own normals.")
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace the output if it exists.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="No progress bar and no summary.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+
+
+def register(ptm: typer.Typer) -> None:
+    """Add these commands to the `ptm` group."""
+    for command in (info, render, convert, relight_video, synthesise):
+        ptm.command(command.__name__.replace("_", "-"))(command)
+
+
+def info(ptm: PtmFile, as_json: AsJson = False) -> None:
+    """Say what is in a PTM."""
+    from impostor.cli import print_summary
+
+    print_summary(ptm_summary(ptm), as_json)
+
+
+def render(
+    ptm: PtmFile,
+    output: Annotated[Path, typer.Option("-o", metavar="OUT.png")],
+    light: Annotated[str, typer.Option(metavar="LU,LV", help="The light: to the right, and up.")] = "0,0",
+    show: Annotated[str, typer.Option("--output", metavar="lit|normal|albedo")] = "lit",
+    gain: Gain = 1.0,
+    specular: Specular = None,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Draw a PTM under one light."""
+    from impostor.cli import check_name
+    from impostor.files.pictures import save_png
+    from impostor.files.ptm_file import read_ptm
+    from impostor.ptm.normals import albedo, normals
+
+    check_name(output, ".png", force)
+    if show not in OUTPUTS:
+        raise SettingsError("--output", f"{show!r}; expected one of {', '.join(OUTPUTS)}")
+    at = _numbers("--light", light, 2)
+    shine = _highlight(specular)
+    polynomials = read_ptm(ptm).polynomials()
+    if polynomials.parameters == "light" and at[0] ** 2 + at[1] ** 2 > 1:
+        raise SettingsError("--light", f"{light}; expected LU and LV of a unit vector, u² + v² at most 1")
+    if show == "normal":
+        picture = _bytes(normals(polynomials) / 2 + 0.5)
+    elif show == "albedo":
+        picture = _on_curve(polynomials, albedo(polynomials))
+    else:
+        picture = _Relit(polynomials, gain, shine).at(*at)
+    save_png(output, picture, force=force)
+    if not quiet:
+        typer.echo(f"{ptm} -> {output} ({picture.shape[1]}x{picture.shape[0]})")
+
+
+def convert(
+    ptm: Annotated[Path, typer.Argument(metavar="IN", help="A .ptm file.")],
+    output: Annotated[Path, typer.Argument(metavar="OUT", help="The new .ptm file.")],
+    format: Annotated[str | None, typer.Option(metavar="rgb|lrgb|lum", help="Another kind of PTM.")] = None,
+    jpeg: Jpeg = None,
+    no_prediction: NoPrediction = False,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a PTM as another kind, compressed or not."""
+    from impostor.cli import check_name
+    from impostor.files.ptm_file import read_ptm
+    from impostor.ptm import quantise
+    from impostor.ptm.convert import FORMATS, converted
+
+    check_name(output, ".ptm", force)
+    kind = None if format is None else format.upper()
+    if kind not in (None, *FORMATS):
+        raise SettingsError("--format", f"{format!r}; expected rgb, lrgb or lum")
+    read = read_ptm(ptm)
+    if kind not in (None, read.format):
+        read = quantise(converted(read.polynomials(), cast(Literal["RGB", "LRGB", "LUM"], kind)))
+    written = _write(read, output, jpeg, no_prediction, force)
+    if not quiet:
+        before = ptm.stat().st_size
+        typer.echo(f"{ptm} ({before / 1e6:.2f} MB) -> {output} ({read.format}, {written / 1e6:.2f} MB)")
+
+
+def relight_video(
+    ptm: PtmFile,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.mp4")],
+    seconds: Annotated[float, typer.Option(help="Of the whole video.")] = 6.0,
+    rate: Annotated[int, typer.Option(help="Pictures a second.")] = 25,
+    elevation: Annotated[float, typer.Option(help="Of the light over the surface, degrees.")] = 40.0,
+    gain: Gain = 1.0,
+    specular: Specular = None,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Let the light go round a PTM once, from the top to the right."""
+    import numpy as np
+
+    from impostor.cli import check_name, progress_bar
+    from impostor.files.ptm_file import read_ptm
+    from impostor.files.video import video_output
+
+    check_name(output, ".mp4", force)
+    if not 0 < seconds <= 3600:
+        raise SettingsError("--seconds", f"{seconds:g}; expected more than 0, up to 3600")
+    if not 1 <= rate <= 240:
+        raise SettingsError("--rate", f"{rate}; expected 1 to 240")
+    if not 0 <= elevation <= 90:
+        raise SettingsError("--elevation", f"{elevation:g}; expected 0 to 90")
+    shine, polynomials = _highlight(specular), read_ptm(ptm).polynomials()
+    relit, count = _Relit(polynomials, gain, shine), max(round(seconds * rate), 1)
+    out = np.cos(np.radians(elevation))
+    with (
+        progress_bar(f"relighting {ptm.name}", quiet) as progress,
+        video_output(output, polynomials.size, rate, force) as add,
+    ):
+        for index, angle in enumerate(2 * np.pi * np.arange(count) / count):
+            add(relit.at(out * np.sin(angle), out * np.cos(angle)))
+            progress(index + 1, count)
+    if not quiet:
+        typer.echo(f"{ptm} -> {output} ({count} pictures, {output.stat().st_size / 1e6:.1f} MB)")
+
+
+def synthesise(
+    ptm: PtmFile,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.ptm")],
+    size: Annotated[str, typer.Option(metavar="WxH", help="Texels of the result.")] = "512x512",
+    patch: Annotated[int, typer.Option(help="Side of a patch: larger than what the surface is made of.")] = 48,
+    seed: Annotated[int, typer.Option(help="The same seed gives the same texture.")] = 0,
+    jpeg: Jpeg = None,
+    no_prediction: NoPrediction = False,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Quilt a PTM of any size that repeats without a seam."""
+    from impostor.cli import as_flags, check_name
+    from impostor.files.ptm_file import read_ptm
+    from impostor.ptm.synthesis import synthesise as quilted
+
+    check_name(output, ".ptm", force)
+    try:
+        width, height = (int(part) for part in size.lower().split("x"))
+    except ValueError:
+        raise SettingsError("--size", f"{size!r}; expected WIDTHxHEIGHT as 512x512") from None
+    read = read_ptm(ptm)
+    with as_flags("size", "patch", "seed"):
+        made = quilted(read, (width, height), patch, seed)
+    written = _write(made, output, jpeg, no_prediction, force)
+    if not quiet:
+        typer.echo(f"{ptm} ({read.size[0]}x{read.size[1]}) -> {output} ({width}x{height}, {written / 1e6:.1f} MB)")
+
+
+def ptm_summary(path: Path) -> dict[str, Any]:
+    """A description of a `.ptm` file, ready for JSON."""
+    from impostor.files.ptm_file import read_header, read_ptm
+
+    header, trailer = read_header(path)
+    read_ptm(path)  # a file that cannot be drawn is not described
+    size = path.stat().st_size
+    summary: dict[str, Any] = {
+        "file": str(path),
+        "bytes": size,
+        "version": header.version,
+        "format": header.format,
+        "width": header.width,
+        "height": header.height,
+        "bytes_per_texel": round(size / (header.width * header.height), 3),
+        "scale": [float(f"{value:.{FIGURES}g}") for value in header.scale],
+        "bias": header.bias.tolist(),
+        "curve": trailer.curve,
+        "parameters": trailer.parameters,
+        "written_by": trailer.tool or None,
+    }
+    if header.planes:
+        summary["jpeg_quality"] = header.quality
+        summary["planes_predicted"] = sum(plane.reference >= 0 for plane in header.planes)
+        summary["planes_inverted"] = sum(plane.inverted for plane in header.planes)
+        summary["side_bytes"] = sum(plane.side_bytes for plane in header.planes)
+    return summary
+
+
+class _Relit:
+    """A PTM as one light after the other shows it."""
+
+    def __init__(self, polynomials: Polynomials, gain: float, shine: tuple[float, float] | None):
+        from impostor.ptm.normals import diffuse_gain, normals
+
+        self._polynomials = diffuse_gain(polynomials, gain) if gain != 1 else polynomials
+        self._shine = shine
+        self._normals = None if shine is None else normals(polynomials)
+
+    def at(self, u: float, v: float) -> NDArray[np.uint8]:
+        """The picture (H, W, 3), sRGB."""
+        from impostor.ptm.normals import relight_specular
+        from impostor.ptm.polynomials import evaluate
+
+        if self._shine is None or self._normals is None:
+            return _on_curve(self._polynomials, evaluate(self._polynomials, u, v))
+        toward = (u, v, max(1 - u * u - v * v, 0.0) ** 0.5)
+        strength, exponent = self._shine
+        lit = relight_specular(self._polynomials, self._normals, toward, specular=strength, exponent=exponent)
+        return _on_curve(self._polynomials, lit)
+
+
+def _on_curve(polynomials: Polynomials, picture: NDArray[np.float32]) -> NDArray[np.uint8]:
+    from impostor.srgb import srgb_from_linear
+
+    return _bytes(srgb_from_linear(picture) if polynomials.curve == "linear" else picture)
+
+
+def _bytes(picture: NDArray[np.floating]) -> NDArray[np.uint8]:
+    import numpy as np
+
+    return np.rint(np.clip(picture, 0, 1) * 255).astype(np.uint8)
+
+
+def _write(ptm: Ptm, output: Path, jpeg: int | None, no_prediction: bool, force: bool) -> int:
+    from impostor.files.ptm_file import write_ptm
+
+    if jpeg is None:
+        if no_prediction:
+            raise SettingsError("--no-prediction", "given without --jpeg; expected both, raw files predict nothing")
+        return write_ptm(ptm, output, force=force)
+    if not 1 <= jpeg <= 100:
+        raise SettingsError("--jpeg", f"{jpeg}; expected 1 to 100")
+    if ptm.format == "LUM":
+        raise SettingsError("--jpeg", "the PTM is LUM; expected LRGB or RGB, which have a compressed kind")
+    return write_ptm(ptm, output, compression="jpeg", quality=jpeg, predict=not no_prediction, force=force)
+
+
+def _highlight(specular: str | None) -> tuple[float, float] | None:
+    if specular is None:
+        return None
+    strength, exponent = _numbers("--specular", specular, 2)
+    if strength < 0 or exponent < 0:
+        raise SettingsError("--specular", f"{specular}; expected a strength and an exponent of 0 or more")
+    return strength, exponent
+
+
+def _numbers(flag: str, text: str, count: int) -> tuple[float, ...]:
+    try:
+        values = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        values = ()
+    if len(values) != count or not all(abs(value) < float("inf") for value in values):
+        raise SettingsError(flag, f"{text!r}; expected {count} numbers with a comma between them, as 0.3,-0.5")
+    return values
