@@ -100,11 +100,13 @@ def light_of_highlight(
         raise SettingsError(
             str(where), f"brightest value on the ball is {brightest:.2f} of white; expected a highlight"
         )
-    spots, _ = ndimage.label(inside & (smooth >= HIGHLIGHT * brightest))
+    spots = np.zeros(picture.shape, np.int32)
+    ndimage.label(inside & (smooth >= HIGHLIGHT * brightest), output=spots)
     areas = np.bincount(spots.ravel())[1:]
     if areas.sum() > LARGEST_HIGHLIGHT * np.pi * circle.radius**2:
         raise SettingsError(str(where), f"highlight covers {areas.sum()} pixels of the ball; expected a small spot")
-    row, column = ndimage.center_of_mass(smooth, spots, int(np.argmax(areas)) + 1)
+    largest = smooth * (spots == int(np.argmax(areas)) + 1)
+    row, column = float((y * largest).sum() / largest.sum()), float((x * largest).sum() / largest.sum())
     across, up = (column - circle.x) / circle.radius, (circle.y - row) / circle.radius
     normal = np.array([across, up, np.sqrt(max(1 - across * across - up * up, 0))])
     # The view vector (0, 0, 1) mirrored in the normal.

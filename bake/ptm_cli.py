@@ -1,8 +1,9 @@
-"""`impostor ptm`: fit, compare, direct."""
+"""`impostor ptm`: from photographs to a PTM, and to its measure."""
 
 from __future__ import annotations
 
 import json
+import math
 import time
 from dataclasses import asdict
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from impostor.cli import AsJson, Force, Quiet, check_name, progress_bar
+from impostor.cli import AsJson, Force, Quiet, UpAxis, check_name, progress_bar
 from impostor.errors import SettingsError
 
 if TYPE_CHECKING:
@@ -19,13 +20,15 @@ if TYPE_CHECKING:
 
     from bake.photographs import Photographs
 
+PICTURES = {".png", ".tif", ".tiff", ".jpg", ".jpeg", ".tga", ".bmp"}
+
 Workers = Annotated[int | None, typer.Option(metavar="N", help="Threads; as many as processors if left out.")]
 CaptureFile = Annotated[Path, typer.Argument(metavar="IMAGES.lp", help="Photographs and their lights.")]
 
 
 def register(ptm: typer.Typer) -> None:
     """Add this stage's commands to the `ptm` group."""
-    for command in (fit, compare, direct):
+    for command in (fit, compare, direct, capture, lights):
         ptm.command(command.__name__)(command)
 
 
@@ -157,6 +160,81 @@ def direct(
         typer.echo(f"{images} -> {output} ({', '.join(parts)})")
 
 
+def capture(
+    subject: Annotated[Path, typer.Argument(metavar="MODEL|HEIGHTS.png", help="A mesh, or heights as a gray picture.")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.lp", help="Photographs go beside it.")],
+    dome: Annotated[
+        str, typer.Option(metavar="geodesic|fibonacci:N[:DEG]|rings:DEGxN,...", help="Where the lights stand.")
+    ] = "geodesic",
+    size: Annotated[int, typer.Option(metavar="TEXELS", help="Side of a mesh's photographs.")] = 256,
+    side: Annotated[str, typer.Option("--from", metavar="front|top", help="Where a mesh is seen from.")] = "front",
+    depth: Annotated[float, typer.Option(metavar="TEXELS", help="Height of white in a picture of heights.")] = 32.0,
+    albedo: Annotated[Path | None, typer.Option(metavar="PNG", help="Colour of a picture of heights.")] = None,
+    gloss: Annotated[str | None, typer.Option(metavar="STRENGTH,SHININESS", help="A highlight.")] = None,
+    no_bounce: Annotated[bool, typer.Option("--no-bounce", help="Direct light only.")] = False,
+    jpeg: Annotated[int | None, typer.Option(metavar="QUALITY", help="JPEG instead of PNG; 1 to 100.")] = None,
+    up: UpAxis = "y",
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Photograph a mesh or a height picture under a dome, with its own shadows and one bounce of light."""
+    from bake.dome import parse_dome
+    from bake.reliefs import relief_of_model, relief_of_picture, write_capture
+    from bake.synthetic_capture import photograph
+
+    check_name(output, ".lp", force)
+    directions = parse_dome(dome)
+    highlight = (0.0, 60.0) if gloss is None else _two_numbers("--gloss", gloss)
+    if jpeg is not None and not 1 <= jpeg <= 100:
+        raise SettingsError("--jpeg", f"{jpeg}; expected 1 to 100")
+    if subject.suffix.lower() in PICTURES:
+        relief = relief_of_picture(subject, depth, albedo, highlight)
+    else:
+        from impostor.model import load_model
+
+        relief = relief_of_model(load_model(subject, up=up), size, side, highlight)
+    with progress_bar(f"photographing {subject.name}", quiet) as progress:
+        pictures = photograph(relief, directions, bounce=not no_bounce, progress=progress)
+    write_capture(list(pictures), directions, output, quality=jpeg, force=force)
+    if not quiet:
+        height, width = relief.heights.shape
+        typer.echo(f"{subject} -> {output} ({len(pictures)} photographs of {width}x{height})")
+
+
+def lights(
+    photographs: Annotated[list[Path], typer.Argument(metavar="BALL...", help="Photographs of a mirror ball.")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.lp")],
+    mask: Annotated[Path | None, typer.Option(metavar="PICTURE", help="White where the ball is.")] = None,
+    circle: Annotated[
+        str | None, typer.Option(metavar="X,Y,RADIUS", help="The ball, in pixels from the top left.")
+    ] = None,
+    of: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--of", metavar="PHOTOGRAPH", help="What the file is to name instead, in the same order; repeatable."
+        ),
+    ] = None,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Find the lights of a capture set from their highlights on a mirror ball."""
+    from bake.chrome_ball import Circle, circle_of_mask, lights_of_ball, read_mask
+    from impostor.files.lp_file import CaptureSet, write_lp
+
+    check_name(output, ".lp", force)
+    if (mask is None) == (circle is None):
+        raise SettingsError("--mask", "expected either --mask or --circle, to know where the ball is")
+    named = of or photographs
+    if len(named) != len(photographs):
+        raise SettingsError("--of", f"{len(named)} photographs; expected {len(photographs)}, one for each of the ball")
+    ball = circle_of_mask(read_mask(mask), mask) if mask else Circle(*_numbers("--circle", circle or "", 3))
+    directions = lights_of_ball(photographs, ball)
+    write_lp(CaptureSet(tuple(named), directions), output, force)
+    if not quiet:
+        place = f"ball at {ball.x:.1f}, {ball.y:.1f}, radius {ball.radius:.1f}"
+        typer.echo(f"{len(directions)} lights -> {output} ({place})")
+
+
 def _capture(lp: Path) -> tuple[Photographs, NDArray[np.float64]]:
     from bake.photographs import open_photographs
 
@@ -183,8 +261,15 @@ def _series(path: Path, count: int) -> tuple[tuple[Path, ...], NDArray[np.float6
 
 
 def _two_numbers(flag: str, text: str) -> tuple[float, float]:
-    try:
-        first, second = (float(part) for part in text.split(","))
-    except ValueError:
-        raise SettingsError(flag, f"{text!r}; expected two numbers as 0.3,-0.5") from None
+    first, second = _numbers(flag, text, 2)
     return first, second
+
+
+def _numbers(flag: str, text: str, count: int) -> list[float]:
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+        raise SettingsError(flag, f"{text!r}; expected {count} numbers with commas between them")
+    return numbers

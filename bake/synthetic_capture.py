@@ -1,4 +1,4 @@
-"""Photographs of a relief that exists only as numbers: with its own shadows, and light that bounces from part to part."""
+"""Photographs of a relief that exists only as numbers: it shadows itself, and its parts light one another."""
 
 from __future__ import annotations
 

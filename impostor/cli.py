@@ -111,13 +111,13 @@ def _ptm_app() -> typer.Typer:
 
 
 def info(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A .fan, or a model.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A .fan, a .ptm, or a model.")],
     as_json: AsJson = False,
     picture: Annotated[Path | None, typer.Option(help="Write the layers of eight views as a PNG.")] = None,
     up: UpAxis = None,
     force: Force = False,
 ) -> None:
-    """Say what is in a fan or a model."""
+    """Say what is in a fan, a PTM or a model."""
     if file.suffix.lower() == ".fan":
         refuse_with_fan(file, up=up)
         from impostor.summary import fan_summary
@@ -129,22 +129,29 @@ def info(
 
             check_name(picture, ".png", force)
             write_contact_sheet(read_fan(file), picture, force)
+    elif picture is not None:
+        raise SettingsError("--picture", f"{file} has no views; expected a .fan")
+    elif file.suffix.lower() == ".ptm":
+        from impostor.summary import ptm_summary
+
+        if up is not None:
+            raise SettingsError("--up", f"given with {file}; expected it with a model")
+        summary = ptm_summary(file)
     else:
         from impostor.summary import model_summary
 
-        if picture is not None:
-            raise SettingsError("--picture", f"{file} has no views; expected a .fan")
         summary = model_summary(file, up or "y")
     print_summary(summary, as_json)
 
 
-def validate(files: Annotated[list[Path], typer.Argument(metavar="FILE...", help=".fan files.")]) -> None:
-    """Check everything that must hold in fans; prints a line for each problem."""
+def validate(files: Annotated[list[Path], typer.Argument(metavar="FILE...", help=".fan and .ptm files.")]) -> None:
+    """Check everything that must hold in fans and PTMs; prints a line for each problem."""
     from impostor.files.fan_file import validate_fan
+    from impostor.files.ptm_file import validate_ptm
 
     problems = 0
     for file in files:
-        found = validate_fan(file)
+        found = validate_ptm(file) if file.suffix.lower() == ".ptm" else validate_fan(file)
         problems += len(found)
         for line in found:
             print(line, file=sys.stderr)

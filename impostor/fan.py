@@ -118,7 +118,7 @@ class Fan:
         """
         covered: NDArray[np.bool_] = self.color[..., 3] > 0
         first, last = covered.argmax(axis=2), self.size - 1 - covered[:, :, ::-1].argmax(axis=2)
-        any_in_row = covered.any(axis=2)
+        any_in_row = np.logical_or.reduce(covered, axis=2)
         row = np.arange(self.size)
         left, top, right, bottom = self.covered_rectangles.T
         free = (
@@ -128,4 +128,4 @@ class Fan:
             (right[:, None] - 1 - last) + (bottom[:, None] - 1 - row),
         )
         free = np.stack([np.where(any_in_row, each, 2 * self.size).min(axis=1) for each in free], axis=-1)
-        return np.where(any_in_row.any(axis=1)[:, None], free, 0).astype(np.int32)
+        return np.where(np.logical_or.reduce(any_in_row, axis=1)[:, None], free, 0).astype(np.int32)

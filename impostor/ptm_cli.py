@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import typer
 
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
     from impostor.ptm import Polynomials, Ptm
 
-FIGURES = 4
 OUTPUTS = ("lit", "normal", "albedo")
 
 PtmFile = Annotated[Path, typer.Argument(metavar="PTM", help="A .ptm file.")]
@@ -41,6 +40,7 @@ def register(ptm: typer.Typer) -> None:
 def info(ptm: PtmFile, as_json: AsJson = False) -> None:
     """Say what is in a PTM."""
     from impostor.cli import print_summary
+    from impostor.summary import ptm_summary
 
     print_summary(ptm_summary(ptm), as_json)
 
@@ -174,35 +174,6 @@ def synthesise(
     written = _write(made, output, jpeg, no_prediction, force)
     if not quiet:
         typer.echo(f"{ptm} ({read.size[0]}x{read.size[1]}) -> {output} ({width}x{height}, {written / 1e6:.1f} MB)")
-
-
-def ptm_summary(path: Path) -> dict[str, Any]:
-    """A description of a `.ptm` file, ready for JSON."""
-    from impostor.files.ptm_file import read_header, read_ptm
-
-    header, trailer = read_header(path)
-    read_ptm(path)  # a file that cannot be drawn is not described
-    size = path.stat().st_size
-    summary: dict[str, Any] = {
-        "file": str(path),
-        "bytes": size,
-        "version": header.version,
-        "format": header.format,
-        "width": header.width,
-        "height": header.height,
-        "bytes_per_texel": round(size / (header.width * header.height), 3),
-        "scale": [float(f"{value:.{FIGURES}g}") for value in header.scale],
-        "bias": header.bias.tolist(),
-        "curve": trailer.curve,
-        "parameters": trailer.parameters,
-        "written_by": trailer.tool or None,
-    }
-    if header.planes:
-        summary["jpeg_quality"] = header.quality
-        summary["planes_predicted"] = sum(plane.reference >= 0 for plane in header.planes)
-        summary["planes_inverted"] = sum(plane.inverted for plane in header.planes)
-        summary["side_bytes"] = sum(plane.side_bytes for plane in header.planes)
-    return summary
 
 
 class _Relit:

@@ -1,4 +1,4 @@
-"""What a person wants to know of a fan or a model at a glance."""
+"""What a person wants to know of a fan, a PTM or a model at a glance."""
 
 from __future__ import annotations
 
@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from impostor.fan import Fan
 from impostor.files.fan_file import read_fan, read_manifest
 from impostor.files.pictures import save_png
+from impostor.files.ptm_file import read_header, read_ptm
 from impostor.model import load_model
 from impostor.normal_code import palette
 
 SHEET_VIEWS = 8
+SCALE_FIGURES = 4
 
 
 def fan_summary(path: Path) -> dict[str, Any]:
@@ -43,6 +45,33 @@ def fan_summary(path: Path) -> dict[str, Any]:
         "settings": dict(sorted(manifest.settings.items())),
         "written_by": manifest.tool,
     }
+
+
+def ptm_summary(path: Path) -> dict[str, Any]:
+    """A description of a `.ptm` file, ready for JSON."""
+    header, trailer = read_header(path)
+    read_ptm(path)  # a file that cannot be drawn is not described
+    size = path.stat().st_size
+    summary: dict[str, Any] = {
+        "file": str(path),
+        "bytes": size,
+        "version": header.version,
+        "format": header.format,
+        "width": header.width,
+        "height": header.height,
+        "bytes_per_texel": round(size / (header.width * header.height), 3),
+        "scale": [float(f"{value:.{SCALE_FIGURES}g}") for value in header.scale],
+        "bias": header.bias.tolist(),
+        "curve": trailer.curve,
+        "parameters": trailer.parameters,
+        "written_by": trailer.tool or None,
+    }
+    if header.planes:
+        summary["jpeg_quality"] = header.quality
+        summary["planes_predicted"] = sum(plane.reference >= 0 for plane in header.planes)
+        summary["planes_inverted"] = sum(plane.inverted for plane in header.planes)
+        summary["side_bytes"] = sum(plane.side_bytes for plane in header.planes)
+    return summary
 
 
 def model_summary(path: Path, up: str = "y") -> dict[str, Any]:

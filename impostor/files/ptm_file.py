@@ -71,6 +71,15 @@ def read_header(path: FilePath) -> tuple[Header, Trailer]:
     return header, parse_trailer(data, header.body + header.body_bytes, path)
 
 
+def validate_ptm(path: FilePath) -> list[str]:
+    """What is wrong with a `.ptm` file: no line, or the one that `read_ptm` would raise."""
+    try:
+        read_ptm(path)
+    except PtmFileError as error:
+        return [str(error)]
+    return []
+
+
 def write_ptm(
     ptm: Ptm,
     path: FilePath,

@@ -194,9 +194,11 @@ def test_a_living_writer_is_left_alone(tmp_path):
 def test_a_finished_file_is_held_until_it_has_its_name(tmp_path, monkeypatch, force, publishing):
     """Another writer that cleans up at that very moment takes nothing away."""
 
-    def publish(source, destination, publish=getattr(os, publishing)):
+    published = getattr(os, publishing)
+
+    def publish(source, destination):
         output._remove_litter(tmp_path / "a.fan")
-        publish(source, destination)
+        published(source, destination)
 
     monkeypatch.setattr(os, publishing, publish)
     with atomic_output(tmp_path / "a.fan", force) as temporary:
