@@ -148,8 +148,9 @@ def open_photographs(paths: Sequence[str | os.PathLike[str]]) -> Photographs:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Pillow warns of large images; here they are refused
         headers = [_header(path) for path in files]
-    first, _, turn = headers[0]
-    for path, (size, mode, _) in zip(files, headers, strict=True):
+        turn = _turn(files[0])
+    first = headers[0][0]
+    for path, (size, mode) in zip(files, headers, strict=True):
         if size != first:
             raise PhotographError(
                 path, f"is {size[0]}x{size[1]}; expected {first[0]}x{first[1]} as {str(files[0].name)!r} is"
@@ -158,7 +159,7 @@ def open_photographs(paths: Sequence[str | os.PathLike[str]]) -> Photographs:
             raise PhotographError(path, "holds floating-point pixels; expected 8 or 16 bits a channel")
     if first[0] * first[1] > MAX_TEXELS:
         raise PhotographError(files[0], f"is {first[0]}x{first[1]}; expected at most {MAX_TEXELS:,} pixels")
-    modes = {mode for _, mode, _ in headers}
+    modes = {mode for _, mode in headers}
     gray = all(mode in (*GRAY_MODES, *DEEP_MODES) for mode in modes)
     dtype = np.dtype(np.uint16 if gray and any(mode in DEEP_MODES for mode in modes) else np.uint8)
     upright = (first[1], first[0]) if turn in SIDEWAYS else first
@@ -212,9 +213,22 @@ def decoded(
             future.cancel()
 
 
-def _header(path: Path) -> tuple[tuple[int, int], str, Image.Transpose | None]:
+def _header(path: Path) -> tuple[tuple[int, int], str]:
     with _opened(path) as image:
-        return image.size, image.mode, TURNS.get(image.getexif().get(ORIENTATION, 1))
+        return image.size, image.mode
+
+
+def _turn(path: Path) -> Image.Transpose | None:
+    with _opened(path) as image:
+        try:
+            if image.format == "PNG":  # getexif would decode the whole picture to look behind it
+                exif = Image.Exif()
+                exif.load(image.info.get("exif", b""))
+            else:
+                exif = image.getexif()
+            return TURNS.get(exif.get(ORIENTATION, 1))
+        except Exception:  # a damaged note on how the camera was held is no reason to refuse its picture
+            return None
 
 
 def _opened(path: Path) -> Image.Image:

@@ -192,7 +192,7 @@ def capture(
     else:
         from impostor.model import load_model
 
-        relief = relief_of_model(load_model(subject, up=up), size, side, highlight)
+        relief = relief_of_model(load_model(subject, up=up or "y"), size, side, highlight)
     with progress_bar(f"photographing {subject.name}", quiet) as progress:
         pictures = photograph(relief, directions, bounce=not no_bounce, progress=progress)
     write_capture(list(pictures), directions, output, quality=jpeg, force=force)

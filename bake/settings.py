@@ -17,7 +17,7 @@ SAMPLES = (1, 2, 4)
 def camera_bases(
     views: int, elevation_deg: float | None, layout: str, size: int, distance: float, samples: int | None
 ) -> np.ndarray:
-    """Bases (views, 3, 3) of the cameras that `bake_fan` takes with these settings, which see there.
+    """Check what `bake_fan` takes, and make the bases (views, 3, 3) of its cameras.
 
     Raises
     ------

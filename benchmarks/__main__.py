@@ -10,7 +10,7 @@ import traceback
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks import baking, coding, files, frames, lighting, loading, overhead, quality, report
+from benchmarks import baking, coding, files, frames, lighting, loading, overhead, quality, report, surfaces
 from benchmarks.tables import Table
 from benchmarks.workbench import DATA, Workbench, say
 
@@ -25,6 +25,7 @@ TABLES: dict[str, Callable[[Workbench], Table]] = {
     "loading": loading.run,
     "coding": coding.run,
     "quality": quality.run,
+    "surfaces": surfaces.run,
 }
 
 

@@ -13,8 +13,7 @@ from benchmarks.scenes import HEIGHT, WIDTH
 from benchmarks.tables import Bar, Row, Table
 from benchmarks.timing import alternate
 from benchmarks.workbench import Workbench, say
-from impostor.lighting import DirectionalLight, Gloss
-from impostor.local_light import LocalLight
+from impostor.lighting import DirectionalLight, Gloss, LocalLight
 from impostor.model import Model
 from impostor.ptm.quantise import Ptm
 from runtime.cameras import Camera

@@ -9,11 +9,28 @@ if TYPE_CHECKING:
     from impostor.fan import Fan
     from impostor.files.fan_file import read_fan as load
     from impostor.files.fan_file import write_fan as save
-    from impostor.lighting import DirectionalLight, Gloss
+    from impostor.files.ptm_file import read_ptm as load_ptm
+    from impostor.files.ptm_file import write_ptm as save_ptm
+    from impostor.lighting import DirectionalLight, Gloss, LocalLight
     from impostor.model import Model, load_model
+    from impostor.ptm.quantise import Ptm
     from impostor.shadow_projection import Ground
 
-__all__ = ["DirectionalLight", "Fan", "Gloss", "Ground", "ImpostorError", "Model", "load", "load_model", "save"]
+__all__ = [
+    "DirectionalLight",
+    "Fan",
+    "Gloss",
+    "Ground",
+    "ImpostorError",
+    "LocalLight",
+    "Model",
+    "Ptm",
+    "load",
+    "load_model",
+    "load_ptm",
+    "save",
+    "save_ptm",
+]
 
 __getattr__ = lazy_names(
     __name__,
@@ -23,9 +40,13 @@ __getattr__ = lazy_names(
         "Gloss": "lighting",
         "Ground": "shadow_projection",
         "ImpostorError": "errors",
+        "LocalLight": "lighting",
         "Model": "model",
+        "Ptm": "ptm.quantise",
         "load": "files.fan_file:read_fan",
         "load_model": "model",
+        "load_ptm": "files.ptm_file:read_ptm",
         "save": "files.fan_file:write_fan",
+        "save_ptm": "files.ptm_file:write_ptm",
     },
 )

@@ -258,8 +258,3 @@ def _usage_problem(error: typer.TyperException) -> str:
 def _fail(message: str, code: int) -> int:
     print(f"impostor: {message}", file=sys.stderr)
     return code
-
-
-def run() -> None:
-    """The console script."""
-    sys.exit(main())

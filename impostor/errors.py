@@ -63,3 +63,11 @@ class PtmFileError(ImpostorError):
 
 class LpFileError(ImpostorError):
     """A `.lp` file that does not say where the light was."""
+
+
+class SceneFileError(ImpostorError):
+    """A scene that is not TOML, breaks a rule of SCENE.md, or names a file that is missing."""
+
+
+class SceneWarning(ImpostorWarning):
+    """Something in a scene that was done otherwise than its file asks for."""

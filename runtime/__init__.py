@@ -10,8 +10,18 @@ if TYPE_CHECKING:
     from runtime.grounds import GroundSurface
     from runtime.instances import Instances
     from runtime.renderer import ImpostorRenderer
+    from runtime.surfaces import Surface, lying_on, rectangle
 
-__all__ = ["Camera", "GroundSurface", "ImpostorRenderer", "Instances", "make_context"]
+__all__ = [
+    "Camera",
+    "GroundSurface",
+    "ImpostorRenderer",
+    "Instances",
+    "Surface",
+    "lying_on",
+    "make_context",
+    "rectangle",
+]
 
 __getattr__ = lazy_names(
     __name__,
@@ -20,6 +30,9 @@ __getattr__ = lazy_names(
         "GroundSurface": "grounds",
         "ImpostorRenderer": "renderer",
         "Instances": "instances",
+        "Surface": "surfaces",
+        "lying_on": "surfaces",
         "make_context": "gpu",
+        "rectangle": "surfaces",
     },
 )

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from impostor.fan import Fan
 from impostor.lighting import Gloss
 from runtime.fan_textures import FanTextures
 from runtime.gl_state import CallerState, set_state
@@ -46,6 +48,11 @@ class Batch:
 
     instances: Instances
     textures: FanTextures
+
+    @cached_property
+    def constants(self) -> NDArray[np.float32]:
+        """What QUAD_DTYPE holds of every view at every level, (levels x views, 12): the last four for a scale of 1."""
+        return np.concatenate([_constants(self.textures.fan, level) for level in range(self.textures.levels)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,16 +157,16 @@ class ImpostorPass:
         """Find the quads of a frame and places for their tiles, and upload the quads, far to near."""
         self._shown = []
         self.statistics = dict.fromkeys(("instances", "tiles", "relit", "coarser"), 0)
-        seen = [(batch, _seen_quads(batch, viewer)) for batch in batches]
+        seen = [(batch, quads_toward(batch.instances, viewer.eye, viewer)) for batch in batches]
         seen = [(batch, quads) for batch, quads in seen if len(quads)]
         if not seen:
             return
-        placed = self._place(seen, viewer)
-        records = np.concatenate(
-            [_records(batch, quads, places) for (batch, quads), places in zip(seen, placed, strict=True)]
-        )
-        order = np.argsort(-(records["center"] @ _sight(viewer)), kind="stable")
-        self._quads.write(records[order])
+        self._place(seen, viewer)
+        # Rows of plain numbers: NumPy moves records field by field.
+        rows = np.concatenate([_rows(tiles, quads) for tiles, (_, quads) in zip(self._shown, seen, strict=True)])
+        rows = rows.take(np.argsort(rows[:, :3] @ -_sight(viewer).astype(np.float32), kind="stable"), axis=0)
+        records = rows.view(QUAD_DTYPE)[:, 0]
+        self._quads.write(records)
         self._shape = self._octagons if records["corner_cuts"].any() else self._rectangles
         assert self._cache is not None
         set_uniforms(
@@ -184,8 +191,8 @@ class ImpostorPass:
             self._cache = TileCache(self._ctx, side, page)
         return self._cache
 
-    def _place(self, seen: list[tuple[Batch, Quads]], viewer: Viewer) -> list[NDArray[np.int32]]:
-        """Places (N, 3) of every batch's tiles.
+    def _place(self, seen: list[tuple[Batch, Quads]], viewer: Viewer) -> None:
+        """Find places for every batch's tiles.
 
         When the cache is full it is emptied; when that is not enough, tiles get coarser, and in the end it grows.
         """
@@ -204,7 +211,7 @@ class ImpostorPass:
                 except CacheFull:
                     self.forget()
                 else:
-                    return [tiles.index.places[tiles.of_quads] for tiles in self._shown]
+                    return
             cache = self._cache_for(batches, 2 * cache.side)
 
     def _tiles(self, cache: TileCache, batch: Batch, quads: Quads, levels: NDArray[np.intp]) -> _Tiles:
@@ -218,8 +225,7 @@ class ImpostorPass:
             missing = np.flatnonzero(entries < 0)
             fresh, first = np.unique(keys[missing], return_index=True)
             sizes = (fan.size >> levels[missing[first]]).tolist()
-            places, _ = cache.places([(owner, key) for key in fresh.tolist()], sizes)
-            index.add(fresh, places)
+            index.add(fresh, cache.place(sizes))
             entries = index.find(keys)
         one_quad = np.full(len(index.places), -1)
         one_quad[entries] = np.arange(len(entries))
@@ -272,13 +278,6 @@ class ImpostorPass:
             self._cache = None
 
 
-def _seen_quads(batch: Batch, viewer: Viewer) -> Quads:
-    quads = quads_toward(batch.instances, viewer.eye)
-    diagonals = np.stack([quads.right + quads.up, quads.right - quads.up])
-    reach = batch.instances.fan.views.radius[quads.view] * np.linalg.norm(diagonals, axis=-1).max(axis=0)
-    return quads.take(viewer.sees(quads.center, reach))
-
-
 def _levels(batch: Batch, quads: Quads, viewer: Viewer) -> NDArray[np.intp]:
     """The coarsest mip level (N,) whose tile is not magnified by more than MAGNIFICATION on screen."""
     side = 2 * batch.instances.fan.views.radius[quads.view] * quads.scale * viewer.pixels_per_metre(quads.origin)
@@ -286,32 +285,39 @@ def _levels(batch: Batch, quads: Quads, viewer: Viewer) -> NDArray[np.intp]:
     return np.clip(np.floor(np.log2(ratio)), 0, batch.textures.levels - 1).astype(np.intp)
 
 
-def _records(batch: Batch, quads: Quads, places: NDArray[np.int32]) -> NDArray[np.void]:
-    fan = batch.instances.fan
-    records = np.zeros(len(quads), QUAD_DTYPE)
+def _rows(tiles: _Tiles, quads: Quads) -> NDArray[np.float32]:
+    """QUAD_DTYPE records as rows (N, 27)."""
+    fan, places = tiles.batch.textures.fan, tiles.index.places[tiles.of_quads]
+    rows = np.empty((len(quads), QUAD_DTYPE.itemsize // 4), np.float32)
     reach = fan.views.radius[quads.view][:, None]
-    records["center"], records["right"], records["up"] = quads.center, quads.right * reach, quads.up * reach
+    rows[:, :3], rows[:, 3:6], rows[:, 6:9] = quads.center, quads.right * reach, quads.up * reach
     # Depth along the view's back counts toward the eye as far as the two agree.
     along = np.einsum("ni,ni->n", quads.basis[:, 2], quads.toward_eye)
-    records["toward_eye"] = quads.toward_eye * along[:, None]
-    left, top, right, bottom = fan.covered_rectangles[quads.view].T
+    rows[:, 9:12] = quads.toward_eye * along[:, None]
+    level = np.log2(fan.size // places[:, 2]).astype(np.intp)
+    constants = tiles.batch.constants.take(level * len(fan.views) + quads.view, axis=0)
+    rows[:, 12:20], rows[:, 20:23] = constants[:, :8], places
+    rows[:, 23:] = constants[:, 8:] * quads.scale[:, None]
+    return rows
+
+
+def _constants(fan: Fan, level: int) -> NDArray[np.float32]:
+    left, top, right, bottom = fan.covered_rectangles.T
     # One texel of the relit tile more on every side, for the filter.
-    border = fan.size // np.maximum(places[:, 2], 1)
+    border, side = 1 << level, fan.size >> level
     edges = np.stack([left - border, fan.size - bottom - border, right + border, fan.size - top + border], axis=-1)
     inside = np.clip(edges, 0, fan.size)
-    records["rectangle"] = inside * (2 / fan.size) - 1
     # What the tile's edge takes from a corner is no longer there to be cut.
     taken = np.abs(edges - inside)
-    cuts = fan.empty_corners[quads.view][:, [2, 3, 0, 1]] - taken[:, [0, 2, 0, 2]] - taken[:, [1, 1, 3, 3]]
+    cuts = fan.empty_corners[:, [2, 3, 0, 1]] - taken[:, [0, 2, 0, 2]] - taken[:, [1, 1, 3, 3]]
     cuts = np.maximum(cuts, 0) * (2 / fan.size)
-    spared = np.square(cuts).sum(axis=1) / 2 * np.square(places[:, 2] / 2)
-    records["corner_cuts"] = cuts * (spared > SPARED_TEXELS)[:, None]
-    records["place"] = places
-    low, high = fan.views.depth_range[quads.view].T
-    offset, slope_right, slope_up = fan.views.plane[quads.view].T
-    depth = np.stack([low - offset, high - low, -slope_right * reach[:, 0], -slope_up * reach[:, 0]], axis=-1)
-    records["depth"] = depth * quads.scale[:, None]
-    return records
+    spared = np.square(cuts).sum(axis=1) / 2 * np.square(side / 2)
+    low, high = fan.views.depth_range.T
+    offset, slope_right, slope_up = fan.views.plane.T
+    reach = fan.views.radius
+    depth = np.stack([low - offset, high - low, -slope_right * reach, -slope_up * reach], axis=-1)
+    rectangle = inside * (2 / fan.size) - 1
+    return np.hstack([rectangle, cuts * (spared > SPARED_TEXELS)[:, None], depth]).astype(np.float32)
 
 
 def _sight(viewer: Viewer) -> NDArray[np.float64]:

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from impostor.errors import GpuError, SettingsError
 from impostor.fan import Fan
-from impostor.lighting import DirectionalLight, Gloss
+from impostor.lighting import DirectionalLight, Gloss, LocalLight
 from impostor.model import Model
+from impostor.ptm.quantise import Ptm
 from impostor.shadow_projection import Ground
 from runtime.checks import check_type, numbers
 from runtime.fan_textures import FanTextures
@@ -23,6 +24,7 @@ from runtime.instances import Instances, Viewer
 from runtime.lights import LightTable, check_lights
 from runtime.meshes import OUTPUTS, MeshBuffers, MeshInstance, MeshPass
 from runtime.shadows import ShadowPass
+from runtime.surfaces import Surface, SurfacePass
 
 DEFAULT_LIGHTS = (DirectionalLight.from_angles(40, 45, (0.75, 0.75, 0.75)),)
 DEFAULT_AMBIENT = 0.25
@@ -48,6 +50,9 @@ class ImpostorRenderer:
     ambient : ndarray, (3,) float64
         Linear light that reaches every normal; set as one number or three. Read-only: replace it.
 
+    local_lights : sequence of LocalLight
+        Lamps in the scene; only surfaces with PTMs show their light.
+
     Examples
     --------
     >>> renderer = ImpostorRenderer(ctx)                                      # doctest: +SKIP
@@ -59,12 +64,14 @@ class ImpostorRenderer:
     def __init__(self, ctx: moderngl.Context, cache_side: int = 4096):
         self._ctx, self._released = ctx, False
         self.lights, self.ambient = DEFAULT_LIGHTS, DEFAULT_AMBIENT
+        self.local_lights: Sequence[LocalLight] = ()
         with preserved_state(ctx):
             self._impostors = ImpostorPass(ctx, cache_side)
             self._mesh_pass, self._ground_pass, self._shadows = MeshPass(ctx), GroundPass(ctx), ShadowPass(ctx)
-            self._table = LightTable(ctx)
+            self._surface_pass, self._table = SurfacePass(ctx), LightTable(ctx)
         self._batches: list[Batch] = []
         self._meshes: list[MeshInstance] = []
+        self._surfaces: list[Surface] = []
 
     @property
     def lights(self) -> Sequence[DirectionalLight]:
@@ -145,8 +152,34 @@ class ImpostorRenderer:
         self._meshes.append(MeshInstance(buffers, matrix, gloss or Gloss()))
         return self._meshes[-1]
 
-    def remove(self, placed: Instances | MeshInstance) -> None:
-        """Take copies or a mesh away again; what is on the GPU goes with the last copy of its fan or model."""
+    def add_surface(
+        self,
+        ptm: Ptm,
+        model: Model,
+        tiling: tuple[float, float] = (1.0, 1.0),
+        world_from_model: ArrayLike | None = None,
+        gloss: Gloss | None = None,
+    ) -> Surface:
+        """Place a mesh with a PTM on it; see `Surface`. Surfaces with the same PTM or model share what is on the GPU.
+
+        Raises
+        ------
+        SettingsError
+            What a `Surface` cannot be made of; a model without texture coordinates; a PTM not of light directions.
+        """
+        self._check_in_use()
+        matrix = np.eye(4) if world_from_model is None else np.asarray(world_from_model, float)
+        surface = Surface(ptm, model, tiling, matrix, gloss or Gloss())
+        with preserved_state(self._ctx):
+            self._surface_pass.prepare([*self._surfaces, surface])
+        self._surfaces.append(surface)
+        return surface
+
+    def remove(self, placed: Instances | MeshInstance | Surface) -> None:
+        """Take copies, a mesh or a surface away again; what is on the GPU goes with the last that needs it."""
+        if any(surface is placed for surface in self._surfaces):
+            self._surfaces = [surface for surface in self._surfaces if surface is not placed]
+            self._surface_pass.prepare(self._surfaces)
         batches = [batch for batch in self._batches if batch.instances is placed]
         meshes = [mesh for mesh in self._meshes if mesh is placed]
         self._batches = [batch for batch in self._batches if batch.instances is not placed]
@@ -187,6 +220,12 @@ class ImpostorRenderer:
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
             self._update_lights(output)
             self._mesh_pass.draw(state, self._meshes, viewer, self._table, output)
+
+    def draw_surfaces(self, clip_from_view: ArrayLike, view_from_world: ArrayLike, output: str = "lit") -> None:
+        """Draw the surfaces that `add_surface` placed; parameters as `draw`. Draw shadows after the ground's."""
+        with self._frame(clip_from_view, view_from_world) as (state, viewer):
+            lights = [*self._lights, *self.local_lights]
+            self._surface_pass.draw(state, self._surfaces, viewer, lights, self._ambient, output)
 
     def draw_ground(
         self, clip_from_view: ArrayLike, view_from_world: ArrayLike, ground: Ground, surface: GroundSurface
@@ -249,8 +288,10 @@ class ImpostorRenderer:
             buffers.release()
         self._batches.clear()
         self._meshes.clear()
+        self._surfaces.clear()
         self._released = True
-        for part in (self._impostors, self._mesh_pass, self._ground_pass, self._shadows, self._table):
+        passes = self._impostors, self._mesh_pass, self._ground_pass, self._shadows, self._surface_pass
+        for part in (*passes, self._table):
             part.release()
 
 

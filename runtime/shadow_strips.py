@@ -20,7 +20,7 @@ from runtime.shadow_bounds import box_corners
 CASTER_DTYPE = np.dtype([("position_scale", "f4", (4,)), ("turn", "f4", (2,)), ("rows", "f4", (4, 4))])
 # Strips are cut from silhouettes whose texels are at most this large on screen.
 LARGEST_TEXEL = 1.0  # pixels
-COARSEST_SIDE = 16  # texels
+COARSEST_SIDE = 8  # texels
 
 
 @dataclass(frozen=True, eq=False)

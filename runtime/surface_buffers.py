@@ -8,8 +8,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from impostor.lighting import DirectionalLight
-from impostor.local_light import LocalLight
+from impostor.lighting import DirectionalLight, LocalLight
 from impostor.model import Model
 from runtime.gpu import set_uniforms
 from runtime.tangents import tangent_mesh

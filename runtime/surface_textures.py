@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from impostor.errors import SettingsError
 from impostor.ptm.mipmaps import halve
 from impostor.ptm.quantise import Ptm
-from impostor.ptm_shading import AMBIENT_WEIGHTS
+from impostor.ptm.shading import AMBIENT_WEIGHTS
 from runtime.gpu import check_texture_size, set_uniforms
 
 KINDS = ("lrgb", "rgb")

@@ -13,7 +13,7 @@ from impostor.errors import SettingsError
 from impostor.lighting import DirectionalLight, Gloss
 from impostor.model import Model
 from impostor.ptm.quantise import Ptm
-from impostor.ptm_shading import ambient_gain, flat_terms
+from impostor.ptm.shading import ambient_gain, flat_terms
 from impostor.shadow_projection import Ground
 from runtime.checks import check_type, numbers
 from runtime.gl_state import CallerState, set_state

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
@@ -72,10 +70,6 @@ class TileCache:
             They do not all fit; tiles placed before stay where they are.
         """
         return np.array([self._place(size) for size in sizes], np.int32).reshape(-1, 3)
-
-    def places(self, keys: list[tuple[Any, ...]], sizes: list[int]) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-        """As `place`."""
-        return self.place(sizes), np.ones(len(keys), bool)
 
     def _place(self, size: int) -> tuple[int, int, int]:
         cell = 1 << max(size - 1, 0).bit_length()

@@ -10,11 +10,13 @@ in vec4 rectangle;    // the covered part of the tile: left, bottom, right, top 
 in vec4 corner_cuts;  // length of what is cut off: left bottom, right bottom, left top, right top
 in vec3 place;        // x, y and side of the relit tile in the cache
 in vec4 depth;        // metres in front of the quad: at depth 0, from there to depth 1, and per unit of plane x and y
+in float fan_share;   // of the pixels, in a crossfade
 out vec2 v_uv;
 flat out vec2 v_toward_eye;
 flat out vec4 v_bounds;
 out float v_depth_start;
 flat out float v_depth_span;
+flat out float v_fan_share;
 
 void main() {
     // The rectangle without its empty corners: an octagon.
@@ -30,4 +32,5 @@ void main() {
     v_toward_eye = vec2(0.5 * (step.z + step.w), step.w);
     v_depth_start = depth.x + dot(plane, depth.zw);
     v_depth_span = depth.y;
+    v_fan_share = fan_share;
 }

@@ -1,20 +1,24 @@
 #version 330
+// One instance draws one copy of a mesh.
 uniform mat4 clip_from_world;
-uniform mat4 world_from_model;
 in vec3 position;
 in vec3 normal;
 in vec2 uv;
 in vec4 tint;  // sRGB curve, as stored
+in vec4 row_0, row_1, row_2;  // of the copy's world_from_model
+in float fan_share;           // of the pixels, in a crossfade
 out vec3 v_world;
 out vec3 v_normal;
 out vec2 v_uv;
 out vec4 v_tint;
+flat out float v_fan_share;
 
 void main() {
-    vec4 world = world_from_model * vec4(position, 1.0);
-    gl_Position = clip_from_world * world;
-    v_world = world.xyz;
-    v_normal = mat3(world_from_model) * normal;
+    vec4 point = vec4(position, 1.0);
+    v_world = vec3(dot(row_0, point), dot(row_1, point), dot(row_2, point));
+    gl_Position = clip_from_world * vec4(v_world, 1.0);
+    v_normal = vec3(dot(row_0.xyz, normal), dot(row_1.xyz, normal), dot(row_2.xyz, normal));
     v_uv = uv;
     v_tint = vec4(mix(tint.rgb / 12.92, pow((tint.rgb + 0.055) / 1.055, vec3(2.4)), step(0.04045, tint.rgb)), tint.a);
+    v_fan_share = fan_share;
 }

@@ -6,16 +6,18 @@ import numpy as np
 import pytest
 
 from impostor.errors import SettingsError
-from impostor.lighting import DirectionalLight, Gloss
+from impostor.lighting import DirectionalLight, Gloss, LocalLight
 from impostor.shadow_projection import Ground
 from runtime import ImpostorRenderer
 from runtime.cameras import Camera
 from runtime.gpu import make_context
 from runtime.grounds import GroundSurface
 from runtime.offscreen import Offscreen
+from runtime.surfaces import rectangle
 from tests import gl as raw
 from tests.conftest import live_objects
 from tests.gl import gl
+from tests.ptms import random_ptm
 from tests.solids import BLUE, Box, Sphere, solid_fan, solid_model
 
 LEVEL = Ground((0, 1, 0))
@@ -25,18 +27,21 @@ MODEL = solid_model(Box((-0.5, 0, -0.5), (0.5, 1.5, 0.5)))
 LIGHTS = [DirectionalLight.from_angles(30, 50, (0.6, 0.5, 0.4)), DirectionalLight.from_angles(-60, 40, (0.3, 0.3, 0.4))]
 CAMERA = Camera.perspective((0, 5, 9), (0, 0.7, 0), 45, 1, 1, 40)
 MATRICES = (CAMERA.clip_from_view, CAMERA.view_from_world)
+PTM = random_ptm(size=(16, 16))
 SURFACE = GroundSurface(texture=np.full((3, 5, 4), 200, np.uint8))
 CALLS = {
     "ground": lambda renderer: renderer.draw_ground(*MATRICES, LEVEL, SURFACE),
     "shadows": lambda renderer: renderer.draw_shadows(*MATRICES, LEVEL),
     "meshes": lambda renderer: renderer.draw_meshes(*MATRICES),
+    "surfaces": lambda renderer: renderer.draw_surfaces(*MATRICES),
     "fans": lambda renderer: renderer.draw(*MATRICES),
     "albedo": lambda renderer: renderer.draw(*MATRICES, output="albedo"),
     "normals": lambda renderer: renderer.draw(*MATRICES, output="normal"),
     "add": lambda renderer: renderer.add(FAN, (0, 0, 3), gloss=Gloss(0.2)),
     "add a mesh": lambda renderer: renderer.add_mesh(MODEL),
+    "add a surface": lambda renderer: renderer.add_surface(PTM, rectangle(1, 1)),
 }
-PICTURE = ("ground", "shadows", "meshes", "fans")
+PICTURE = ("ground", "surfaces", "shadows", "meshes", "fans")
 
 
 def scene(renderer):
@@ -44,6 +49,8 @@ def scene(renderer):
     renderer.add(FAN, [(-2, 0, 0), (2, 0, -1)], 0.3)
     renderer.add(PAINTED, (0, 0, -2), gloss=Gloss(0.5))
     renderer.add_mesh(MODEL)
+    renderer.add_surface(PTM, rectangle(2, 2), world_from_model=matrix_at(0, 1, -3))
+    renderer.local_lights = [LocalLight((0, 1, -2))]
 
 
 def matrix_at(x, y, z):

@@ -241,13 +241,17 @@ class TestManyCopies:
 
     def test_a_cut_corner_takes_nothing_off_the_picture(self, renderer, draw, monkeypatch):
         """Large enough on the screen for an octagon; a ball leaves a lot of every corner free."""
-        renderer.add(solid_fan(Sphere(color=RED), Box((-1, -1, 0), (0, 0, 0.1), GREEN), views=4, size=64))
+        fan, matrices = (
+            solid_fan(Sphere(color=RED), Box((-1, -1, 0), (0, 0, 0.1), GREEN), views=4, size=64),
+            filling(1.2),
+        )
         monkeypatch.setattr("runtime.impostors.SPARED_TEXELS", 10)
-        matrices = filling(1.2, 0.3)
+        ball = renderer.add(fan)
         cut = draw(matrices)
         assert renderer._impostors._shape is renderer._impostors._octagons
         monkeypatch.setattr("runtime.impostors.SPARED_TEXELS", 1e9)
-        renderer._impostors.forget()
+        renderer.remove(ball)
+        renderer.add(fan)
         np.testing.assert_array_equal(draw(matrices), cut)
         assert renderer._impostors._shape is renderer._impostors._rectangles
 

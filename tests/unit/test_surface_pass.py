@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from impostor.errors import SettingsError
-from impostor.lighting import DirectionalLight, Gloss
-from impostor.local_light import LocalLight
+from impostor.lighting import DirectionalLight, Gloss, LocalLight
 from impostor.model import Model
 from impostor.ptm.normals import normals
 from impostor.ptm.polynomials import Polynomials, basis
 from impostor.ptm.quantise import Ptm, quantise
-from impostor.ptm_shading import ambient_gain, shaded
+from impostor.ptm.shading import ambient_gain, shaded
 from impostor.shadow_projection import Ground
 from impostor.srgb import linear_from_srgb, srgb_from_linear
 from impostor.views import direction

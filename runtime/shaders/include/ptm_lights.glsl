@@ -1,4 +1,4 @@
-// The light of a surface at one point, under directional and local lights. Equals impostor.ptm_shading.
+// The light of a surface at one point, under directional and local lights. Equals impostor.ptm.shading.
 const float DROP_OFF = 0.1;  // as impostor.ptm.polynomials has it
 const int MOST_LIGHTS = 48;
 uniform vec4 lights[2 * MOST_LIGHTS];  // direction toward the light, 0, or position and radius; linear colour

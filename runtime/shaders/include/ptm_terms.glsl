@@ -1,4 +1,4 @@
-// The light of a flat surface: a sum of pictures. Equals impostor.ptm_shading.shaded.
+// The light of a flat surface: a sum of pictures. Equals impostor.ptm.shading.shaded.
 const int MOST_TERMS = 48;
 uniform int term_count;
 uniform vec4 terms[3 * MOST_TERMS];  // weights of a0..a3; of a4, a5; linear colour

@@ -1,0 +1,9 @@
+#version 330
+// The fan's pixels of a crossfade.
+#include "relit_quad.glsl"
+#include "crossfade.glsl"
+
+void main() {
+    if (!shows_fan()) discard;
+    show_tile();
+}
