@@ -12,13 +12,16 @@ from numpy.typing import NDArray
 from impostor.lighting import Gloss
 from impostor.model import Material, Model, Primitive
 from runtime.gl_state import CallerState, set_state
-from runtime.gpu import SRGB8_ALPHA8, check_texture_size, load_program, set_uniforms
+from runtime.gpu import SRGB8_ALPHA8, InstanceBuffer, check_texture_size, load_program, set_uniforms
 from runtime.instances import Viewer
 from runtime.lights import LightTable
 
 ALPHA_MODES = {"OPAQUE": 0, "MASK": 1, "BLEND": 2}
 OUTPUTS = {"lit": 0, "albedo": 1, "normal": 2}
 VERTEX_DTYPE = np.dtype([("position", "f4", (3,)), ("normal", "f4", (3,)), ("uv", "f4", (2,)), ("tint", "u1", (4,))])
+VERTEX_FORMATS = {"position": ("3f", "12x"), "normal": ("3f", "12x"), "uv": ("2f", "8x"), "tint": ("4f1", "4x")}
+COPY_DTYPE = np.dtype([("row_0", "f4", (4,)), ("row_1", "f4", (4,)), ("row_2", "f4", (4,)), ("fan_share", "f4")])
+COPY_FORMATS = {"row_0": ("4f", "16x"), "row_1": ("4f", "16x"), "row_2": ("4f", "16x"), "fan_share": ("1f", "4x")}
 
 
 class MeshPart:
@@ -61,19 +64,24 @@ class MeshBuffers:
         self.model = model
         self._white = ctx.texture((1, 1), 4, b"\xff\xff\xff\xff")
         self.parts = [MeshPart(ctx, primitive, self._white) for primitive in model.primitives]
-        self._arrays: dict[int, list[moderngl.VertexArray]] = {}
+        self._arrays: dict[tuple[int, int | None], list[moderngl.VertexArray]] = {}
+        self.triangle_count = model.triangle_count
 
-    def vertex_arrays(self, ctx: moderngl.Context, program: moderngl.Program) -> list[moderngl.VertexArray]:
-        """One vertex array a part for a program; attributes that it lacks are passed over."""
-        if program.glo not in self._arrays:
-            formats = {"position": "3f", "normal": "3f", "uv": "2f", "tint": "4f1"}
-            padding = {"position": "12x", "normal": "12x", "uv": "8x", "tint": "4x"}
-            layout = " ".join(formats[name] if name in program else padding[name] for name in formats)
-            names = [name for name in formats if name in program]
-            self._arrays[program.glo] = [
-                ctx.vertex_array(program, [(part.vertices, layout, *names)], part.indices) for part in self.parts
+    def vertex_arrays(
+        self, ctx: moderngl.Context, program: moderngl.Program, copies: InstanceBuffer | None = None
+    ) -> list[moderngl.VertexArray]:
+        """One vertex array a part for a program; attributes that it lacks are passed over.
+
+        `copies` holds a COPY_DTYPE record for each instance, for a program that takes them.
+        """
+        key = program.glo, copies and copies.buffer.glo
+        if key not in self._arrays:
+            vertices = _layout(program, VERTEX_FORMATS)
+            records = [] if copies is None else [(copies.buffer, *_layout(program, COPY_FORMATS, "/i"))]
+            self._arrays[key] = [
+                ctx.vertex_array(program, [(part.vertices, *vertices), *records], part.indices) for part in self.parts
             ]
-        return self._arrays[program.glo]
+        return self._arrays[key]
 
     def release(self) -> None:
         """Free everything on the GPU."""
@@ -102,12 +110,72 @@ class MeshInstance:
     gloss: Gloss = field(default_factory=Gloss)
 
 
+@dataclass(frozen=True, eq=False)
+class MeshCopies:
+    """Copies of one mesh that are drawn together.
+
+    Parameters
+    ----------
+    buffers : MeshBuffers
+    gloss : Gloss
+    world_from_model : ndarray, (N, 4, 4) float64
+        Affine.
+    fan_share : ndarray, (N,) float32, optional
+        The part of each copy's pixels that is left to its fan, in a crossfade.
+    """
+
+    buffers: MeshBuffers
+    gloss: Gloss
+    world_from_model: NDArray[np.float64]
+    fan_share: NDArray[np.float32] | None = None
+
+    @classmethod
+    def gathered(cls, meshes: Sequence[MeshInstance]) -> list[MeshCopies]:
+        """Meshes that share buffers and gloss, put together."""
+        groups: dict[tuple[int, Gloss], list[MeshInstance]] = {}
+        for mesh in meshes:
+            groups.setdefault((id(mesh.buffers), mesh.gloss), []).append(mesh)
+        return [
+            cls(group[0].buffers, group[0].gloss, np.array([mesh.world_from_model for mesh in group], float))
+            for group in groups.values()
+        ]
+
+    def seen_by(self, viewer: Viewer) -> MeshCopies:
+        """Those whose bounding sphere touches the view frustum, near to far."""
+        model, turned = self.buffers.model, self.world_from_model[:, :3, :3]
+        centers = turned @ model.bounds.mean(axis=0) + self.world_from_model[:, :3, 3]
+        # The largest row of its product with itself bounds how a matrix stretches, exactly where axes stay at right
+        # angles.
+        stretch = np.abs(turned.swapaxes(1, 2) @ turned).sum(axis=2).max(axis=1)
+        seen = np.flatnonzero(viewer.sees(centers, model.radius * np.sqrt(stretch)))
+        seen = seen[np.argsort(-(centers[seen] @ viewer.view_from_world[2, :3]), kind="stable")]
+        shares = None if self.fan_share is None else self.fan_share[seen]
+        return MeshCopies(self.buffers, self.gloss, self.world_from_model[seen], shares)
+
+    def records(self) -> NDArray[np.void]:
+        """As (N,) COPY_DTYPE."""
+        rows = np.zeros((len(self.world_from_model), COPY_DTYPE.itemsize // 4), np.float32)
+        rows[:, :12] = self.world_from_model[:, :3].reshape(-1, 12)
+        if self.fan_share is not None:
+            rows[:, 12] = self.fan_share
+        return rows.view(COPY_DTYPE)[:, 0]
+
+
 class MeshPass:
-    """Draws meshes lit per pixel, opaque, depth-tested, in the caller's framebuffer."""
+    """Draws meshes lit per pixel, opaque, depth-tested, in the caller's framebuffer.
+
+    Attributes
+    ----------
+    statistics : dict of int
+        Of the last draw: `meshes` and `triangles` drawn.
+    """
 
     def __init__(self, ctx: moderngl.Context):
         self._ctx = ctx
         self._program = load_program(ctx, "mesh.vert", "mesh.frag")
+        self._fading_program = load_program(ctx, "mesh.vert", "mesh_fading.frag")
+        self._copies = InstanceBuffer(ctx, COPY_DTYPE)
+        self.statistics = {"meshes": 0, "triangles": 0}
 
     def draw(
         self,
@@ -118,31 +186,62 @@ class MeshPass:
         output: str = "lit",
     ) -> None:
         """Draw meshes; `output` is "lit", "albedo" or "normal" (view space, n / 2 + 1/2)."""
+        self.draw_copies(state, MeshCopies.gathered(meshes), viewer, lights, output)
+
+    def draw_copies(
+        self,
+        state: CallerState,
+        copies: Sequence[MeshCopies],
+        viewer: Viewer,
+        lights: LightTable,
+        output: str = "lit",
+    ) -> None:
+        """Draw copies that the viewer sees, one draw call for each part of what shares a mesh; else as `draw`."""
+        self.statistics = {"meshes": 0, "triangles": 0}
+        seen = [group.seen_by(viewer) for group in copies if len(group.world_from_model)]
         state.bind_target()
-        lights.bind(self._program, unit=1)
-        set_uniforms(
-            self._program,
-            clip_from_world=viewer.clip_from_world,
-            view_from_world=viewer.view_from_world[:3, :3],
-            eye=tuple(viewer.eye),
-            output_kind=OUTPUTS[output],
-        )
-        for mesh in meshes:
+        for program, fading in ((self._program, False), (self._fading_program, True)):
+            groups = [
+                group for group in seen if len(group.world_from_model) and (group.fan_share is not None) == fading
+            ]
+            if not groups:
+                continue
+            lights.bind(program, unit=1)
             set_uniforms(
-                self._program,
-                world_from_model=np.asarray(mesh.world_from_model),
-                gloss=(mesh.gloss.strength, mesh.gloss.shininess),
+                program,
+                clip_from_world=viewer.clip_from_world,
+                view_from_world=viewer.view_from_world[:3, :3],
+                eye=tuple(viewer.eye),
+                output_kind=OUTPUTS[output],
             )
-            draw_parts(self._ctx, mesh.buffers, self._program)
+            for group in groups:
+                self._draw_group(program, group)
+
+    def _draw_group(self, program: moderngl.Program, group: MeshCopies) -> None:
+        count = len(group.world_from_model)
+        set_uniforms(program, gloss=(group.gloss.strength, group.gloss.shininess))
+        self._copies.write(group.records())
+        draw_parts(self._ctx, group.buffers, program, copies=self._copies, count=count)
+        self.statistics["meshes"] += count
+        self.statistics["triangles"] += count * group.buffers.triangle_count
 
     def release(self) -> None:
-        """Free the program."""
-        self._program.release()
+        """Free the programs and the buffer."""
+        for resource in (self._program, self._fading_program, self._copies):
+            resource.release()
 
 
-def draw_parts(ctx: moderngl.Context, buffers: MeshBuffers, program: moderngl.Program, *, depth: bool = True) -> None:
-    """Draw every part of a mesh with a program that includes `surface.glsl`."""
-    for part, array in zip(buffers.parts, buffers.vertex_arrays(ctx, program), strict=True):
+def draw_parts(
+    ctx: moderngl.Context,
+    buffers: MeshBuffers,
+    program: moderngl.Program,
+    *,
+    depth: bool = True,
+    copies: InstanceBuffer | None = None,
+    count: int = 1,
+) -> None:
+    """Draw every part of a mesh, or of `count` copies, with a program that includes `surface.glsl`."""
+    for part, array in zip(buffers.parts, buffers.vertex_arrays(ctx, program, copies), strict=True):
         set_state(depth_test=depth, depth_write=depth, cull_back=depth and not part.material.double_sided)
         part.texture.use(0)
         surface = {
@@ -152,4 +251,10 @@ def draw_parts(ctx: moderngl.Context, buffers: MeshBuffers, program: moderngl.Pr
             "alpha_threshold": part.material.alpha_cutoff,
         }
         set_uniforms(program, **{name: value for name, value in surface.items() if name in program})
-        array.render(moderngl.TRIANGLES)
+        array.render(moderngl.TRIANGLES, instances=count)
+
+
+def _layout(program: moderngl.Program, formats: dict[str, tuple[str, str]], step: str = "") -> list[str]:
+    """A buffer's format string and the names of its attributes; those a program lacks are padding."""
+    names = [name for name in formats if name in program]
+    return [" ".join(used if name in names else unused for name, (used, unused) in formats.items()) + step, *names]
