@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import numpy as np
 import scipy.fft
@@ -15,6 +15,7 @@ from impostor.ptm.polynomials import Polynomials
 from impostor.ptm.quantise import Ptm
 
 AnyPtm = TypeVar("AnyPtm", Polynomials, Ptm)
+AnyTexels = TypeVar("AnyTexels", NDArray[np.float32], NDArray[np.uint8])
 TOLERANCE = 0.1  # A patch is drawn from those whose overlap is at most so much worse than the best one's.
 OVERLAP = 4  # A patch overlaps the next one by a fourth.
 SMALLEST_PATCH = 8
@@ -38,7 +39,7 @@ def synthesise(ptm: AnyPtm, size: tuple[int, int], patch: int = 48, seed: int = 
     Returns
     -------
     Polynomials or Ptm
-        As the given one; every texel of it is one of that.
+        As the given one; its texels differ from their neighbours as they do in that.
 
     Raises
     ------
@@ -48,17 +49,66 @@ def synthesise(ptm: AnyPtm, size: tuple[int, int], patch: int = 48, seed: int = 
     Notes
     -----
     A patch is sought, and cut out, by the distance between reflectance functions: the mean squared difference of
-    their RGB over all light directions, so that no light shows a seam that another hides.
+    their RGB over all light directions, so that no light shows a seam that another hides. What is left of a seam is
+    spread over its surroundings: coefficients are linear, so that differences between texels can be summed up anew.
 
     References
     ----------
-    HPL-2004-225, "Texture Synthesis"; Hel-Or, Malzbender, Gelb 2003; Efros and Freeman 2001 (image quilting).
+    HPL-2004-225, "Texture Synthesis"; Hel-Or, Malzbender, Gelb 2003; Efros and Freeman 2001 (image quilting);
+    Perez, Gangnet, Blake 2003 (differences summed up, as a Poisson equation).
     """
     polynomials = ptm.polynomials() if isinstance(ptm, Ptm) else ptm
     rows, columns = quilt(reflectance_features(polynomials), size, patch, seed)
     fields = ("coefficients", "color", "chroma")
     texels = {name: getattr(ptm, name) for name in fields if getattr(ptm, name) is not None}
-    return replace(ptm, **{name: array[rows, columns] for name, array in texels.items()})
+    return replace(ptm, **{name: without_seams(array, rows, columns) for name, array in texels.items()})
+
+
+def without_seams(texels: AnyTexels, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> AnyTexels:
+    """Texels taken from here and there whose differences across the seams are those of their surroundings.
+
+    Parameters
+    ----------
+    texels : ndarray of shape (H, W, ...), float32 or uint8
+    rows, columns : ndarray of shape (height, width), intp
+        Where each texel of the result comes from; the result is a torus.
+
+    Returns
+    -------
+    ndarray of shape (height, width, ...), as `texels`
+        Of the mean of what was taken; where there is no seam between two texels, their difference is nearly kept.
+    """
+    taken = texels[rows, columns].astype(np.float32)
+    divergence = np.zeros_like(taken)
+    for axis, positions in ((0, rows), (1, columns)):
+        ahead = _differences(texels, rows, columns, positions, axis)
+        divergence += ahead - np.roll(ahead, 1, axis)
+    height, width = rows.shape
+    response = 2 * np.cos(2 * np.pi * np.fft.fftfreq(height))[:, None] + 2 * np.cos(2 * np.pi * np.fft.rfftfreq(width))
+    response -= 4
+    response[0, 0] = 1
+    spectrum = np.asarray(scipy.fft.rfft2(divergence, axes=(0, 1)))
+    spectrum /= response.astype(np.float32).reshape(*response.shape, *[1] * (taken.ndim - 2))
+    spectrum[0, 0] = taken.sum(axis=(0, 1))
+    summed = np.asarray(scipy.fft.irfft2(spectrum, (height, width), axes=(0, 1)))
+    if texels.dtype == np.uint8:
+        summed = np.rint(np.clip(summed, 0, 255))
+    return cast(AnyTexels, summed.astype(texels.dtype))
+
+
+def _differences(
+    texels: AnyTexels, rows: NDArray[np.intp], columns: NDArray[np.intp], positions: NDArray[np.intp], axis: int
+) -> NDArray[np.float32]:
+    """From each texel to the next one along an axis: the mean of what both their patches say of it."""
+    last = texels.shape[axis] - 1
+    found = []
+    for from_next in (False, True):
+        at = np.roll(positions, -1, axis) - 1 if from_next else positions
+        beyond = np.clip(at, 0, last - 1)
+        other = np.roll(columns if axis == 0 else rows, -1, axis) if from_next else columns if axis == 0 else rows
+        here, there = ((beyond, other), (beyond + 1, other)) if axis == 0 else ((other, beyond), (other, beyond + 1))
+        found.append(texels[there].astype(np.float32) - texels[here])
+    return (found[0] + found[1]) / 2
 
 
 def reflectance_features(polynomials: Polynomials) -> NDArray[np.float32]:

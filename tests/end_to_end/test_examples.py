@@ -132,6 +132,21 @@ def test_the_code_on_the_page_runs_as_pasted(tmp_path):
     assert (trees != house).any()
 
 
+def test_the_page_about_ptms_runs_as_pasted(tmp_path):
+    page = (ROOT / "docs" / "ptm.md").read_text()
+    commands, piece = (re.findall(rf"```{kind}\n(.*?)```", page, re.DOTALL) for kind in ("sh", "python"))
+    assert len(commands) == len(piece) == 1
+    (tmp_path / "sample_models").symlink_to(SAMPLES)
+    for line in commands[0].splitlines():
+        run("-m", *line.split(), cwd=tmp_path)
+    assert picture(tmp_path / "rosette.png").shape == (128, 128, 3)
+    assert (tmp_path / "rosette.mp4").stat().st_size > 10_000
+    piece = f"{piece[0]}\nimport sys\nsys.stdout.write(screen.color().tobytes().hex())"
+    shown = np.frombuffer(bytes.fromhex(run("-c", piece, cwd=tmp_path)), np.uint8).reshape(480, 640, 4)
+    assert shown[5, 5].tolist() == [0, 0, 0, 255]
+    assert shown[150:330, 200:400, :3].std() > 10
+
+
 def test_the_example_stays_short():
     assert len((ROOT / "examples" / "embed.py").read_text().splitlines()) < 60
 

@@ -10,7 +10,7 @@ import pytest
 import benchmarks.readme as readme_table
 from tests.data import ROOT
 
-DOCUMENTS = ["README.md", "CONVENTIONS.md", "CHANGELOG.md", "docs/method.md", "docs/embedding.md"]
+DOCUMENTS = ["README.md", "CONVENTIONS.md", "CHANGELOG.md", "docs/method.md", "docs/embedding.md", "docs/ptm.md"]
 PACKAGES = ("impostor", "bake", "runtime")
 
 

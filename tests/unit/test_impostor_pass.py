@@ -228,7 +228,7 @@ class TestManyCopies:
         rendered = moderngl.VertexArray.render
 
         def spied(array, *arguments, **options):
-            if array in (renderer._impostors._rectangles, renderer._impostors._octagons):
+            if array in (renderer._impostors._whole.rectangles, renderer._impostors._whole.octagons):
                 calls.append(options["instances"])
             return rendered(array, *arguments, **options)
 
@@ -248,12 +248,12 @@ class TestManyCopies:
         monkeypatch.setattr("runtime.impostors.SPARED_TEXELS", 10)
         ball = renderer.add(fan)
         cut = draw(matrices)
-        assert renderer._impostors._shape is renderer._impostors._octagons
+        assert renderer._impostors._whole.shape is renderer._impostors._whole.octagons
         monkeypatch.setattr("runtime.impostors.SPARED_TEXELS", 1e9)
         renderer.remove(ball)
         renderer.add(fan)
         np.testing.assert_array_equal(draw(matrices), cut)
-        assert renderer._impostors._shape is renderer._impostors._rectangles
+        assert renderer._impostors._whole.shape is renderer._impostors._whole.rectangles
 
     @pytest.mark.parametrize("matrices", [filling(3.0, 0.2), looking((1, 1, 9))])
     def test_the_order_of_the_arrays_does_not_show(self, renderer, draw, matrices):
@@ -281,7 +281,7 @@ class TestManyCopies:
     def test_copies_outside_the_picture_cost_nothing(self, renderer, draw):
         renderer.add(FAN, [(0, 50, 0), (50, 0, 0), (0, -50, 0), (0, 0, 60)])
         assert not draw(looking((0, 0, 20))).any()
-        assert renderer.statistics == {"instances": 0, "tiles": 0, "relit": 0, "coarser": 0}
+        assert not any(renderer.statistics.values())
 
     def test_no_copies_and_hidden_copies_draw_nothing(self, renderer, draw):
         renderer.add(FAN, np.zeros((0, 3)))

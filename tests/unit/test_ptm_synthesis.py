@@ -1,11 +1,13 @@
-"""A quilted PTM tiles, and is made of nothing but the given one."""
+"""A quilted PTM tiles, and looks like the given one."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from impostor.errors import SettingsError
 from impostor.ptm import Ptm, quantise, relight
-from impostor.ptm.synthesis import reflectance_features, synthesise
+from impostor.ptm.synthesis import reflectance_features, synthesise, without_seams
 from tests.ptms import matt_bumps, random_polynomials
 
 
@@ -20,11 +22,31 @@ def bumps():
 
 
 @pytest.mark.parametrize("size", [(130, 97), (48, 48), (200, 60)])
-def test_a_quilt_has_the_size_and_only_texels_of_its_source(bumps, size):
+def test_a_quilt_has_the_size_and_the_tones_of_its_source(bumps, size):
     quilted = synthesise(bumps, size, patch=32)
     assert isinstance(quilted, Ptm) and quilted.size == size
-    source = {texel.tobytes() for texel in bumps.coefficients.reshape(-1, 6)}
-    assert {texel.tobytes() for texel in quilted.coefficients.reshape(-1, 6)} <= source
+    for light in ([0, 0, 1], [0.6, 0.3, 0.74]):
+        source, found = (relight(ptm.polynomials(), light) for ptm in (bumps, quilted))
+        assert found.mean() == pytest.approx(source.mean(), abs=0.05)
+        assert found.std() == pytest.approx(source.std(), rel=0.3)
+
+
+def test_no_step_of_a_quilt_is_larger_than_in_its_source():
+    """Smooth bumps in one colour: a seam would show as the one sharp line."""
+    _, polynomials = matt_bumps((140, 120))
+    plain = replace(polynomials, color=np.full_like(polynomials.color, 0.7))
+    source, found = (reflectance_features(ptm) for ptm in (plain, synthesise(plain, (120, 90), patch=32, seed=1)))
+    for axis in (0, 1):
+        natural = np.square(np.diff(source, axis=axis)).sum(axis=-1)
+        assert steps(found, axis).max() < 1.5 * natural.max()
+
+
+def test_what_has_no_seam_stays_as_it_is():
+    """A torus, turned by a third."""
+    y, x = np.mgrid[:24, :36]
+    texels = np.stack([np.sin(2 * np.pi * y / 12), np.cos(2 * np.pi * x / 18), 0 * x], axis=-1).astype(np.float32)
+    rows, columns = (y[:12, :18] + 4, x[:12, :18] + 6)
+    np.testing.assert_allclose(without_seams(texels, rows, columns), texels[4:16, 6:24], atol=1e-5)
 
 
 def test_no_seam_is_worse_where_it_repeats_than_inside(bumps):
