@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bake.design import Design
+from bake.small_products import multiply
 from impostor.ptm.polynomials import RGB_FROM_YCRCB, TERMS
 
 TYPICAL_LUMINANCE = 0.5  # root mean square over the lights, of every texel whose colour leaves room for it
 DARKEST = np.float32(1e-6)  # a texel that is black under all lights
 TINY = np.float32(1e-20)
-SQUARINGS = 3  # the eighth power: a second colour half as strong as the first is left at 0.4 percent
+POWER = 4  # of the squares: a second colour half as strong as the first is left at 0.4 percent
 
 
 def luminance_and_color(planes: NDArray[np.float32], design: Design) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -39,15 +40,19 @@ def luminance_and_color(planes: NDArray[np.float32], design: Design) -> tuple[ND
     """
     terms = list(design.terms)
     root = np.linalg.cholesky(_gram(design) / len(design.matrix)).T.astype(np.float32)
-    channels = np.ascontiguousarray(planes[terms].transpose(2, 0, 1))
-    color = np.maximum(_leading_vector(root @ channels), 0)  # what is below 0 there is noise
+    used = planes if len(terms) == TERMS else planes[terms]
+    channels = np.ascontiguousarray(used.transpose(2, 0, 1))
+    weighted = multiply(root, channels)
+    squares = _squares(weighted)
+    color = np.maximum(_leading_vector(squares), 0)  # what is below 0 there is noise
     color /= np.maximum(np.sqrt(np.einsum("cn,cn->n", color, color)), TINY)
-    luminance = np.zeros((TERMS, planes.shape[1]), np.float32)
-    luminance[terms] = sum(channel * weight for channel, weight in zip(channels, color, strict=True))
-    size = np.linalg.norm(root @ luminance[terms], axis=0)
+    size = np.sqrt(np.maximum(np.einsum("cn,cn->n", color, _product(squares, color)), 0))
     scale = np.minimum(size / np.float32(TYPICAL_LUMINANCE), 1 / np.maximum(color.max(axis=0), TINY))
     scale[scale < DARKEST] = 1
-    return luminance / scale, (color * scale).T
+    red, green, blue = color / scale
+    luminance = np.zeros((TERMS, planes.shape[1]), np.float32)
+    luminance[terms] = channels[0] * red + channels[1] * green + channels[2] * blue
+    return luminance, (color * scale).T
 
 
 def luma_and_chroma(
@@ -140,26 +145,26 @@ def _gram(design: Design) -> NDArray[np.float64]:
     return active.T @ active
 
 
-def _leading_vector(weighted: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The direction in RGB along which N sets of coefficients (3, T, N) are largest: (3, N), unit length.
+def _squares(weighted: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Products of the channels of N sets of coefficients (3, T, N): RR, GG, BB, RG, GB, BR, as (6, N)."""
+    pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)]
+    return np.stack([np.einsum("tn,tn->n", weighted[i], weighted[j]) for i, j in pairs])
 
-    It is the leading eigenvector of a 3x3 matrix a texel, found by squaring the matrix: each step doubles the power.
+
+def _product(squares: NDArray[np.float32], vector: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The symmetric 3x3 matrices of `_squares` times vectors (3, N)."""
+    rr, gg, bb, rg, gb, br = squares
+    r, g, b = vector
+    return np.stack([rr * r + rg * g + br * b, rg * r + gg * g + gb * b, br * r + gb * g + bb * b])
+
+
+def _leading_vector(squares: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The direction in RGB along which N sets of coefficients are largest: (3, N), of any length.
+
+    By the power method, from gray: a colour has no negative part, so gray is never at right angles to it.
     """
-    xx, yy, zz = (np.einsum("tn,tn->n", channel, channel) for channel in weighted)
-    xy, yz, zx = (np.einsum("tn,tn->n", weighted[i], weighted[(i + 1) % 3]) for i in range(3))
-    for _ in range(SQUARINGS):
-        unit = 1 / np.maximum(xx + yy + zz, TINY)
-        xx, yy, zz, xy, yz, zx = (entry * unit for entry in (xx, yy, zz, xy, yz, zx))
-        xx, yy, zz, xy, yz, zx = (
-            xx * xx + xy * xy + zx * zx,
-            xy * xy + yy * yy + yz * yz,
-            zx * zx + yz * yz + zz * zz,
-            xy * (xx + yy) + zx * yz,
-            yz * (yy + zz) + xy * zx,
-            zx * (zz + xx) + yz * xy,
-        )
-    # The row that belongs to the largest diagonal entry is the one that rounding harmed least.
-    x_is_largest, y_is_larger = (xx >= yy) & (xx >= zz), yy >= zz
-    rows = np.where(x_is_largest, [xx, xy, zx], np.where(y_is_larger, [xy, yy, yz], [zx, yz, zz]))
-    vector = rows / np.maximum(np.sqrt(np.einsum("cn,cn->n", rows, rows)), TINY)
-    return vector * np.where(vector.sum(axis=0) < 0, np.float32(-1), np.float32(1))
+    unit = squares / np.maximum(squares[0] + squares[1] + squares[2], TINY)
+    vector = np.ones((3, squares.shape[1]), np.float32)
+    for _ in range(POWER):
+        vector = _product(unit, vector)
+    return vector

@@ -1,17 +1,17 @@
-"""Photographs of one object under many lights: opened and checked, then decoded a batch ahead in worker threads."""
+"""Photographs of one object under many lights: opened and checked, then decoded a batch at a time in worker threads."""
 
 from __future__ import annotations
 
 import os
 import warnings
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from PIL import Image
 
 from impostor.errors import ImpostorError
@@ -117,10 +117,10 @@ class Photographs:
                 deep = np.asarray(band).astype(np.int64).clip(0, 65535)[..., None]
                 out[top : top + BAND] = deep if self.dtype == np.uint16 else deep >> 8
                 continue
-            pixels = np.asarray(band if band.mode == wanted else band.convert(wanted))
+            pixels = np.frombuffer((band if band.mode == wanted else band.convert(wanted)).tobytes(), np.uint8)
             # 257 takes 255 to 65535: an 8-bit photograph among 16-bit ones.
             scaled = pixels if self.dtype == np.uint8 else pixels.astype(np.uint16) * 257
-            out[top : top + BAND] = scaled.reshape(out[top : top + BAND].shape)
+            out[top : top + BAND] = scaled.reshape(-1, width, self.channels)
 
 
 def open_photographs(paths: Sequence[str | os.PathLike[str]]) -> Photographs:
@@ -167,9 +167,9 @@ def open_photographs(paths: Sequence[str | os.PathLike[str]]) -> Photographs:
 
 
 def decoded(
-    photographs: Photographs, pool: ThreadPoolExecutor, batch: int, indices: ArrayLike | None = None
+    photographs: Photographs, pool: ThreadPoolExecutor, batch: int
 ) -> Iterator[tuple[NDArray[np.int64], NDArray[Any]]]:
-    """Photographs in batches, the next of which is decoded while the caller works on this one.
+    """All photographs in batches, each decoded by several threads.
 
     Parameters
     ----------
@@ -177,40 +177,28 @@ def decoded(
     pool : ThreadPoolExecutor
         Where they are decoded; Pillow lets other threads run meanwhile.
     batch : int
-        Photographs in a batch. Two batches are in memory at a time.
-    indices : array_like of int, optional
-        Which photographs; all if not given.
+        About how many photographs are in memory at a time; batches are of one size and keep all threads busy.
 
     Yields
     ------
     indices : ndarray of shape (K,), int64
     pixels : ndarray of shape (K, H, W, C), uint8 or uint16
-        Written over when the next but one is asked for.
+        Written over by the next batch.
 
     Raises
     ------
     PhotographError
         As `Photographs.decode`.
     """
-    chosen = np.arange(len(photographs)) if indices is None else np.asarray(indices, np.int64)
-    batches = [chosen[start : start + batch] for start in range(0, len(chosen), batch)]
-    shape = (photographs.size[1], photographs.size[0], photographs.channels)
-    memory = [np.empty((len(part), *shape), photographs.dtype) for part in batches[:2]]
-
-    def begin(number: int) -> list[Future[NDArray[Any]]]:
-        slots = memory[number % 2]
-        return [pool.submit(photographs.decode, int(index), slots[k]) for k, index in enumerate(batches[number])]
-
-    ahead = begin(0) if batches else []
-    try:
-        for number, current in enumerate(batches):
-            for future in ahead:
-                future.result()
-            ahead = begin(number + 1) if number + 1 < len(batches) else []
-            yield current, memory[number % 2][: len(current)]
-    finally:
-        for future in ahead:
-            future.cancel()
+    workers = pool._max_workers
+    even = -(-len(photographs) // -(-len(photographs) // batch))
+    step = min(-(-even // workers) * workers, len(photographs))
+    memory = np.empty((step, photographs.size[1], photographs.size[0], photographs.channels), photographs.dtype)
+    for start in range(0, len(photographs), step):
+        indices = np.arange(start, min(start + step, len(photographs)))
+        for _ in pool.map(photographs.decode, indices.tolist(), memory):
+            pass
+        yield indices, memory[: len(indices)]
 
 
 def _header(path: Path) -> tuple[tuple[int, int], str]:

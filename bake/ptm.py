@@ -22,6 +22,7 @@ from bake.color_models import (
 from bake.design import ALL_TERMS, Design, make_design
 from bake.photographs import Photographs, decoded
 from bake.robust import robust_coefficients
+from bake.small_products import multiply
 from impostor.errors import SettingsError
 from impostor.files.lp_file import CaptureSet
 from impostor.ptm.polynomials import TERMS, Curve, Parameters, Polynomials
@@ -30,8 +31,8 @@ from impostor.srgb import linear_from_srgb
 FORMATS = ("lrgb", "rgb", "lum")
 SPACES = ("ycbcr", "principal")
 LOWEST = -0.02  # a light this little below the horizon is one on it, measured badly
-BATCH = 12  # photographs between two visits to the accumulators; two batches weigh as much as the accumulators
-BLOCK = 8192  # values of a photograph: a batch's block in floats stays in a core's second-level cache
+BATCH = 18  # photographs between two visits to the accumulators, which weigh as much as 24 of them
+BLOCK = 4800  # values of a photograph: a batch's block in floats stays in a core's second-level cache
 SLICES_A_WORKER = 4  # so that workers end together
 
 
@@ -221,7 +222,7 @@ def _add(
             np.copyto(values[:, :width], photographs[:, low:high])
         else:
             np.take(table, photographs[:, low:high], out=values[:, :width], mode="clip")
-        np.matmul(weights, values[:, :width], out=share[:, :width])
+        multiply(weights, values[:, :width], share[:, :width])
         if begun:
             planes[:, low:high] += share[:, :width]
         else:

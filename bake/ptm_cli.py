@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from impostor.cli import AsJson, Force, Quiet, UpAxis, check_name, progress_bar
+from impostor.cli import AsJson, Force, Quiet, UpAxis, as_flags, check_name, progress_bar
 from impostor.errors import SettingsError
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ def register(ptm: typer.Typer) -> None:
         ptm.command(command.__name__)(command)
 
 
+@as_flags("format", "space", "workers")
 def fit(
     images: CaptureFile,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.ptm")],
@@ -100,6 +101,7 @@ def fit(
         )
 
 
+@as_flags("workers")
 def compare(
     ptm: Annotated[Path, typer.Argument(metavar="PTM")],
     test: Annotated[Path, typer.Argument(metavar="TEST.lp", help="Photographs that were not fitted.")],
@@ -160,6 +162,7 @@ def direct(
         typer.echo(f"{images} -> {output} ({', '.join(parts)})")
 
 
+@as_flags("dome", "depth", "size", side="--from")
 def capture(
     subject: Annotated[Path, typer.Argument(metavar="MODEL|HEIGHTS.png", help="A mesh, or heights as a gray picture.")],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.lp", help="Photographs go beside it.")],

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from bake.design import Design
 from bake.photographs import Photographs, decoded
+from bake.small_products import multiply, solve_symmetric
 from impostor.ptm.polynomials import TERMS
 from impostor.srgb import linear_from_srgb
 
@@ -128,11 +129,11 @@ class _Weigher:
     def _polynomial_weights(self, values: Floats) -> Floats:
         """Weights (N, n) by the distance from each texel's own polynomial (Cauchy)."""
         weights = np.ones_like(values)
-        fitted = self.solver @ values
+        fitted = multiply(self.solver, values)
         for step in range(STEPS):
             if step:
                 fitted = _weighted(self.basis, values[..., None], weights)[..., 0]
-            residual = values - self.basis @ fitted
+            residual = values - multiply(self.basis, fitted)
             weights = 1 / (1 + (residual / _spread(residual)) ** 2)
         return weights
 
@@ -145,28 +146,28 @@ class _Weigher:
         surface = predicted = np.zeros(0, np.float32)
         for _ in range(STEPS):
             surface = _weighted(toward, light[..., None], weights + np.float32(1e-4))[..., 0]
-            predicted = toward @ surface
+            predicted = multiply(toward, surface)
             residual = light - predicted
             weights = (predicted > 0) / (1 + (residual / _spread(residual)) ** 2)
         albedo = np.maximum(np.linalg.norm(surface, axis=0), np.float32(1e-6))
         facing = np.maximum(predicted / albedo, 0)
         deviation = np.abs(light / albedo - facing) / np.maximum(facing, np.float32(0.1))
-        deviation[facing <= 0.1] = np.nan
-        deviation[0, np.isnan(deviation).all(axis=0)] = 1
-        share = (DIFFUSE[1] - np.nanmedian(deviation, axis=0)) / (DIFFUSE[1] - DIFFUSE[0])
+        deviation[facing <= 0.1] = np.inf
+        middle = np.maximum((facing > 0.1).sum(axis=0) - 1, 0) // 2
+        median = np.take_along_axis(np.sort(deviation, axis=0), middle[None], axis=0)[0]
+        share = (DIFFUSE[1] - median) / (DIFFUSE[1] - DIFFUSE[0])
         return weights * facing**PEAK, share.clip(0, 1).astype(np.float32)
 
 
 def _weighted(terms: Floats, values: Floats, weights: Floats) -> Floats:
     """Weighted least squares of many texels: terms (N, T), values (N, n, C) and weights (N, n) to (T, n, C)."""
     size = terms.shape[1]
-    rows, columns = np.triu_indices(size)
-    upper = weights.T @ (terms[:, rows] * terms[:, columns])
-    gram = np.empty((weights.shape[1], size, size))
-    gram[:, rows, columns] = upper
-    gram[:, columns, rows] = upper
-    right = np.stack([(weights * values[..., c]).T @ terms for c in range(values.shape[2])], axis=-1)
-    return np.linalg.solve(gram, right.astype(np.float64)).astype(np.float32).swapaxes(0, 1)
+    rows, columns = np.tril_indices(size)
+    gram = np.zeros((size, size, weights.shape[1]))
+    gram[rows, columns] = multiply(np.ascontiguousarray((terms[:, rows] * terms[:, columns]).T), weights)
+    across = np.ascontiguousarray(terms.T)
+    right = np.stack([multiply(across, weights * values[..., c]) for c in range(values.shape[2])], axis=-1)
+    return solve_symmetric(gram, right.astype(np.float64)).astype(np.float32)
 
 
 def _spread(residual: Floats) -> Floats:

@@ -55,7 +55,7 @@ class PlainQuads:
         assert cache is not None
         self._field, self._ctx = field, ctx
         self._count = field.renderer.statistics["instances"]
-        self._records = ctx.buffer(impostors._quads.buffer.read(self._count * QUAD_DTYPE.itemsize))
+        self._records = ctx.buffer(impostors._whole.quads.buffer.read(self._count * QUAD_DTYPE.itemsize))
         self._corners = ctx.buffer(CORNERS)
         self._texture = ctx.texture(cache.color.size, 4, cache.color.read())
         self._arrays = {fetch: self._array(fetch) for fetch in (BILINEAR, TRILINEAR)}

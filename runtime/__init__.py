@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from runtime.gpu import make_context
     from runtime.grounds import GroundSurface
     from runtime.instances import Instances
+    from runtime.lod import LevelOfDetail
     from runtime.renderer import ImpostorRenderer
     from runtime.surfaces import Surface, lying_on, rectangle
 
@@ -17,6 +18,7 @@ __all__ = [
     "GroundSurface",
     "ImpostorRenderer",
     "Instances",
+    "LevelOfDetail",
     "Surface",
     "lying_on",
     "make_context",
@@ -30,6 +32,7 @@ __getattr__ = lazy_names(
         "GroundSurface": "grounds",
         "ImpostorRenderer": "renderer",
         "Instances": "instances",
+        "LevelOfDetail": "lod",
         "Surface": "surfaces",
         "lying_on": "surfaces",
         "make_context": "gpu",

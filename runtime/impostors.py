@@ -17,7 +17,8 @@ from runtime.gl_state import CallerState, set_state
 from runtime.gpu import InstanceBuffer, load_program, set_uniforms
 from runtime.instances import Instances, Quads, Viewer, quads_toward
 from runtime.lights import LightTable
-from runtime.relight import ROW_DTYPE, TILE_DTYPE, ColormapPass, RelightPass
+from runtime.lod import Levels
+from runtime.relighting import Relighter, ShownTiles
 from runtime.tiles import CacheFull, TileCache, TileIndex
 
 QUAD_DTYPE = np.dtype(
@@ -32,22 +33,39 @@ QUAD_DTYPE = np.dtype(
         ("depth", "f4", (4,)),
     ]
 )
+SHARE_DTYPE = np.dtype([("fan_share", "f4")])
 # Corners are cut where that spares so many texels of the relit tile: small triangles cost more than they spare.
 SPARED_TEXELS = 800
 # As triangle strips: corner of the covered rectangle; 1 where it is cut along y, 0 along x.
 RECTANGLE = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], "f4")
 OCTAGON = np.array([(x, y, along) for y, sides in ((0, (0, 1)), (1, (1, 0))) for along in sides for x in (0, 1)], "f4")
 ALPHA_CUTOFF = 1 / 32
+STATISTICS = ("instances", "fading", "triangles_spared", "tiles", "relit", "coarser")
 # A tile may be drawn this much larger than it is before the next finer mip level is relit.
 MAGNIFICATION = 1.2
 
 
 @dataclass
 class Batch:
-    """Instances that share a fan, and the fan's textures."""
+    """Instances that share a fan, the fan's textures, and the instances' levels where they have a mesh, too."""
 
     instances: Instances
     textures: FanTextures
+    levels: Levels | None = None
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """Equal while the instances look the same to the same viewer."""
+        return (id(self.textures), *self.instances.key, self.levels and self.levels.key)
+
+    def seen_by(self, viewer: Viewer) -> Quads:
+        """The instances that show some of their fan in the picture."""
+        quads = quads_toward(self.instances, viewer.eye, viewer)
+        return quads if self.levels is None else quads.take(self.levels.fan_share[quads.index] > 0)
+
+    def shares_of(self, quads: Quads) -> NDArray[np.float32]:
+        """The part (N,) of each one's pixels that shows the fan."""
+        return np.ones(len(quads), np.float32) if self.levels is None else self.levels.fan_share[quads.index]
 
     @cached_property
     def constants(self) -> NDArray[np.float32]:
@@ -55,30 +73,47 @@ class Batch:
         return np.concatenate([_constants(self.textures.fan, level) for level in range(self.textures.levels)])
 
 
-@dataclass(frozen=True, eq=False)
-class _Tiles:
-    """The tiles that a batch shows in a frame.
+class _Drawing:
+    """Quads in one draw call: whole fans, or with the shader of a crossfade some of each one's pixels."""
 
-    Parameters
-    ----------
-    batch : Batch
-    index : TileIndex
-    of_quads : ndarray, (N,) intp
-        Entry in the index of every quad's tile.
-    entries : ndarray, (M,) intp
-        The distinct ones.
-    quads : Quads
-        One that shows each of them.
-    levels : ndarray, (M,) intp
-        Their mip levels.
-    """
+    def __init__(self, ctx: moderngl.Context, fragment: str, corners: Sequence[moderngl.Buffer]):
+        self.program = load_program(ctx, "impostor.vert", fragment)
+        self.quads, self._shares = InstanceBuffer(ctx, QUAD_DTYPE), InstanceBuffer(ctx, SHARE_DTYPE)
+        instances = [(self.quads.buffer, "3f 3f 3f 3f 4f 4f 3f 4f/i", *(QUAD_DTYPE.names or ()))]
+        if "fan_share" in self.program:
+            instances.append((self._shares.buffer, "1f/i", "fan_share"))
+        self.rectangles, self.octagons = (
+            ctx.vertex_array(self.program, [(each, "3f", "corner"), *instances]) for each in corners
+        )
+        self.shape, self._count = self.rectangles, 0
 
-    batch: Batch
-    index: TileIndex
-    of_quads: NDArray[np.intp]
-    entries: NDArray[np.intp]
-    quads: Quads
-    levels: NDArray[np.intp]
+    def write(self, quads: NDArray[np.void], shares: NDArray[np.float32], viewer: Viewer, cache_side: int) -> None:
+        """Take QUAD_DTYPE records and the fan's share of each."""
+        self._count = len(quads)
+        if not len(quads):
+            return
+        self.quads.write(quads)
+        if "fan_share" in self.program:
+            self._shares.write(shares.view(SHARE_DTYPE))
+        self.shape = self.octagons if quads["corner_cuts"].any() else self.rectangles
+        set_uniforms(
+            self.program,
+            clip_from_world=viewer.clip_from_world,
+            cache_size=(cache_side, cache_side),
+            tiles=0,
+            tile_depth=1,
+            alpha_cutoff=ALPHA_CUTOFF,
+        )
+
+    def render(self) -> None:
+        """Draw what was written."""
+        if self._count:
+            self.shape.render(moderngl.TRIANGLE_STRIP, instances=self._count)
+
+    def release(self) -> None:
+        """Free everything."""
+        for resource in (self.rectangles, self.octagons, self.quads, self._shares, self.program):
+            resource.release()
 
 
 class ImpostorPass:
@@ -93,30 +128,23 @@ class ImpostorPass:
     Attributes
     ----------
     statistics : dict of int
-        Of the last draw: `instances` drawn, `tiles` they needed, `relit` tiles, `coarser` mip levels that a full
-        cache forced.
+        Of the last draw: `instances` drawn, those of them that were `fading`, `triangles_spared` because a fan was
+        drawn whole where there was a mesh, `tiles` the instances needed, `relit` tiles, `coarser` mip levels that a
+        full cache forced.
     """
 
     def __init__(self, ctx: moderngl.Context, cache_side: int = 4096):
         self._ctx, self._cache_side = ctx, cache_side
         self._cache: TileCache | None = None
-        self._program = load_program(ctx, "impostor.vert", "impostor.frag")
-        self._colormaps, self._relight = ColormapPass(ctx), RelightPass(ctx)
-        self._quads, self._corners = (
-            InstanceBuffer(ctx, QUAD_DTYPE),
-            [ctx.buffer(each) for each in (RECTANGLE, OCTAGON)],
-        )
-        names = QUAD_DTYPE.names or ()
-        instances = (self._quads.buffer, "3f 3f 3f 3f 4f 4f 3f 4f/i", *names)
-        self._rectangles, self._octagons = (
-            ctx.vertex_array(self._program, [(corners, "3f", "corner"), instances]) for corners in self._corners
-        )
-        self._shape = self._rectangles
+        self._relighter = Relighter(ctx)
+        self._corners = [ctx.buffer(each) for each in (RECTANGLE, OCTAGON)]
+        names = ("impostor.frag", "impostor_fading.frag")
+        self._whole, self._fading = (_Drawing(ctx, name, self._corners) for name in names)
         self._indexes: dict[tuple[int, Gloss], TileIndex] = {}
         self._frame: tuple[object, ...] | None = None
-        self._shown: list[_Tiles] = []
+        self._shown: list[ShownTiles] = []
         self._normals_for: NDArray[np.float64] | None = None
-        self.statistics: dict[str, int] = {}
+        self.statistics = dict.fromkeys(STATISTICS, 0)
 
     def draw(
         self, state: CallerState, batches: Sequence[Batch], viewer: Viewer, lights: LightTable, output: str = "lit"
@@ -129,21 +157,22 @@ class ImpostorPass:
             # Normals turn with the viewer, so nothing lit before can be kept.
             self.forget()
         self._normals_for = viewer.view_from_world[:3, :3] if output == "normal" else None
-        frame = (viewer.key, *((id(batch.textures), *batch.instances.key) for batch in batches))
+        frame = (viewer.key, *(batch.key for batch in batches))
         if frame != self._frame:
             # Where nothing has moved, the last frame's quads are this one's.
             self._frame = None
             self._arrange(batches, viewer)
             self._frame = frame
-        self.statistics["relit"] = sum(self._relight_stale(tiles, lights) for tiles in self._shown)
-        cache, count = self._cache, self.statistics["instances"]
-        if cache is None or not count:
+        cache = self._cache
+        if cache is None or not self.statistics["instances"]:
             return
+        self.statistics["relit"] = self._relighter.relight(self._shown, lights, cache, self._normals_for)
         state.bind_target()
         set_state(depth_test=True, depth_write=True, blend=(moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA))
         cache.color.use(0)
         cache.depth.use(1)
-        self._shape.render(moderngl.TRIANGLE_STRIP, instances=count)
+        self._whole.render()
+        self._fading.render()
 
     def forget(self) -> None:
         """Drop every relit tile."""
@@ -156,29 +185,32 @@ class ImpostorPass:
     def _arrange(self, batches: Sequence[Batch], viewer: Viewer) -> None:
         """Find the quads of a frame and places for their tiles, and upload the quads, far to near."""
         self._shown = []
-        self.statistics = dict.fromkeys(("instances", "tiles", "relit", "coarser"), 0)
-        seen = [(batch, quads_toward(batch.instances, viewer.eye, viewer)) for batch in batches]
+        self.statistics = dict.fromkeys(STATISTICS, 0)
+        seen = [(batch, batch.seen_by(viewer)) for batch in batches]
         seen = [(batch, quads) for batch, quads in seen if len(quads)]
         if not seen:
             return
         self._place(seen, viewer)
-        # Rows of plain numbers: NumPy moves records field by field.
-        rows = np.concatenate([_rows(tiles, quads) for tiles, (_, quads) in zip(self._shown, seen, strict=True)])
-        rows = rows.take(np.argsort(rows[:, :3] @ -_sight(viewer).astype(np.float32), kind="stable"), axis=0)
-        records = rows.view(QUAD_DTYPE)[:, 0]
-        self._quads.write(records)
-        self._shape = self._octagons if records["corner_cuts"].any() else self._rectangles
         assert self._cache is not None
-        set_uniforms(
-            self._program,
-            clip_from_world=viewer.clip_from_world,
-            cache_size=(self._cache.side, self._cache.side),
-            tiles=0,
-            tile_depth=1,
-            alpha_cutoff=ALPHA_CUTOFF,
+        # Rows of plain numbers: NumPy moves records field by field.
+        rows = np.concatenate(
+            [_rows(batch, tiles, quads) for tiles, (batch, quads) in zip(self._shown, seen, strict=True)]
         )
-        self.statistics["instances"] = len(records)
+        shares = np.concatenate([batch.shares_of(quads) for batch, quads in seen])
+        order = np.argsort(rows[:, :3] @ -_sight(viewer).astype(np.float32), kind="stable")
+        records, shares = rows.take(order, axis=0).view(QUAD_DTYPE)[:, 0], shares.take(order)
+        fading = np.flatnonzero(shares < 1)
+        # Far to near stays the order: from the farthest copy in a crossfade on, all go through its shader.
+        first = int(fading[0]) if len(fading) else len(records)
+        self._whole.write(records[:first], shares[:first], viewer, self._cache.side)
+        self._fading.write(records[first:], shares[first:], viewer, self._cache.side)
+        self.statistics["instances"], self.statistics["fading"] = len(records), len(fading)
         self.statistics["tiles"] = sum(len(tiles.entries) for tiles in self._shown)
+        self.statistics["triangles_spared"] = sum(
+            int(np.count_nonzero(batch.shares_of(quads) == 1)) * batch.levels.buffers.triangle_count
+            for batch, quads in seen
+            if batch.levels is not None
+        )
 
     def _cache_for(self, batches: Sequence[Batch], side: int) -> TileCache:
         page = 1 << max(max(batch.textures.size for batch in batches) - 1, 255).bit_length()
@@ -214,7 +246,7 @@ class ImpostorPass:
                     return
             cache = self._cache_for(batches, 2 * cache.side)
 
-    def _tiles(self, cache: TileCache, batch: Batch, quads: Quads, levels: NDArray[np.intp]) -> _Tiles:
+    def _tiles(self, cache: TileCache, batch: Batch, quads: Quads, levels: NDArray[np.intp]) -> ShownTiles:
         fan = batch.textures
         owner = id(fan), batch.instances.gloss
         index = self._indexes.setdefault(owner, TileIndex())
@@ -231,47 +263,11 @@ class ImpostorPass:
         one_quad[entries] = np.arange(len(entries))
         distinct = np.flatnonzero(one_quad >= 0)
         chosen = one_quad[distinct]
-        return _Tiles(batch, index, entries, distinct, quads.take(chosen), levels[chosen])
-
-    def _relight_stale(self, tiles: _Tiles, lights: LightTable) -> int:
-        """Relight what was lit otherwise or not at all; returns how many tiles that were."""
-        assert self._cache is not None
-        versions = tiles.index.versions[tiles.entries]
-        stale, new = versions != lights.version, versions < 0
-        for chosen in (np.flatnonzero(new), np.flatnonzero(stale & ~new)):
-            for start in range(0, len(chosen), self._colormaps.ROWS):
-                self._relight_tiles(tiles, chosen[start : start + self._colormaps.ROWS], lights)
-        tiles.index.versions[tiles.entries] = lights.version
-        return int(np.count_nonzero(stale))
-
-    def _relight_tiles(self, tiles: _Tiles, chosen: NDArray[np.intp], lights: LightTable) -> None:
-        """Relight some of a frame's tiles, either all of them new or none."""
-        assert self._cache is not None
-        fan, gloss = tiles.batch.textures, tiles.batch.instances.gloss
-        entries, levels, views = tiles.entries[chosen], tiles.levels[chosen], tiles.quads.view[chosen]
-        new = bool(tiles.index.versions[entries[0]] < 0)
-        rows = np.zeros(len(chosen), ROW_DTYPE)
-        rows["row"], rows["basis"] = np.arange(len(chosen)), tiles.quads.basis[chosen]
-        rows["albedo"], rows["gloss"] = fan.albedo, (gloss.strength, gloss.shininess)
-        self._colormaps.write(rows, lights, self._normals_for)
-        work = np.zeros(len(chosen), TILE_DTYPE)
-        work["place"][:, :3], work["place"][:, 3] = tiles.index.places[entries], levels
-        work["origin"][:, :2], work["origin"][:, 2] = fan.tile_origins(views, levels), rows["row"]
-        # A new tile is drawn whole, because another may lie beneath.
-        work["part"][:, 2:] = work["place"][:, 2:3]
-        if not new:
-            covered = fan.fan.covered_rectangles[views]
-            work["part"][:, :2] = np.maximum((covered[:, :2] >> levels[:, None]) - 1, 0)
-            reach = (covered[:, 2:] - 1 >> levels[:, None]) + 2
-            work["part"][:, 2:] = np.minimum(reach, work["part"][:, 2:])
-        show_normals = self._normals_for is not None
-        self._relight.draw(fan, work, self._colormaps.texture, self._cache, normals=show_normals, depth=new)
+        return ShownTiles(fan, batch.instances.gloss, index, entries, distinct, quads.take(chosen), levels[chosen])
 
     def release(self) -> None:
         """Free everything this pass made."""
-        for resource in (self._rectangles, self._octagons, self._quads, *self._corners, self._program):
-            resource.release()
-        for part in (self._colormaps, self._relight):
+        for part in (self._whole, self._fading, *self._corners, self._relighter):
             part.release()
         if self._cache is not None:
             self._cache.release()
@@ -285,9 +281,9 @@ def _levels(batch: Batch, quads: Quads, viewer: Viewer) -> NDArray[np.intp]:
     return np.clip(np.floor(np.log2(ratio)), 0, batch.textures.levels - 1).astype(np.intp)
 
 
-def _rows(tiles: _Tiles, quads: Quads) -> NDArray[np.float32]:
+def _rows(batch: Batch, tiles: ShownTiles, quads: Quads) -> NDArray[np.float32]:
     """QUAD_DTYPE records as rows (N, 27)."""
-    fan, places = tiles.batch.textures.fan, tiles.index.places[tiles.of_quads]
+    fan, places = tiles.textures.fan, tiles.index.places[tiles.of_quads]
     rows = np.empty((len(quads), QUAD_DTYPE.itemsize // 4), np.float32)
     reach = fan.views.radius[quads.view][:, None]
     rows[:, :3], rows[:, 3:6], rows[:, 6:9] = quads.center, quads.right * reach, quads.up * reach
@@ -295,7 +291,7 @@ def _rows(tiles: _Tiles, quads: Quads) -> NDArray[np.float32]:
     along = np.einsum("ni,ni->n", quads.basis[:, 2], quads.toward_eye)
     rows[:, 9:12] = quads.toward_eye * along[:, None]
     level = np.log2(fan.size // places[:, 2]).astype(np.intp)
-    constants = tiles.batch.constants.take(level * len(fan.views) + quads.view, axis=0)
+    constants = batch.constants.take(level * len(fan.views) + quads.view, axis=0)
     rows[:, 12:20], rows[:, 20:23] = constants[:, :8], places
     rows[:, 23:] = constants[:, 8:] * quads.scale[:, None]
     return rows

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import moderngl
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from impostor.errors import SettingsError
 from impostor.lighting import DirectionalLight
 from runtime.gpu import check_texture_size, set_uniforms
+
+REMEMBERED = 256  # versions
 
 
 def check_lights(lights: Sequence[DirectionalLight]) -> None:
@@ -43,6 +46,7 @@ class LightTable:
         self._count = 0
         self._ambient = (0.0, 0.0, 0.0)
         self.version = 0
+        self._past: dict[int, tuple[NDArray[Any], ...]] = {}
 
     def update(self, lights: Sequence[DirectionalLight], ambient: ArrayLike) -> None:
         """Take over the lights of this frame; nothing is written when they are those of the last one."""
@@ -61,6 +65,17 @@ class LightTable:
         self._texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._held, self._count, self._ambient = wanted, len(lights), (red, green, blue)
         self.version += 1
+        self._past[self.version] = rows[: len(lights), 0, :3], rows[: len(lights), 1, :3], np.array(self._ambient)
+        self._past.pop(self.version - REMEMBERED, None)
+
+    def change_since(self, versions: NDArray[np.int64]) -> NDArray[np.float64]:
+        """By how much what was lit with some versions (N,) can be off now, as linear light (N,).
+
+        A bound of the diffuse part; infinite where the number of lights was another or the version is forgotten.
+        """
+        now = self._past[self.version]
+        distinct, of_each = np.unique(versions, return_inverse=True)
+        return np.array([_change(self._past.get(int(version)), now) for version in distinct])[of_each]
 
     def bind(self, program: moderngl.Program, unit: int) -> None:
         """Give a program that includes `lights.glsl` its uniforms."""
@@ -70,3 +85,12 @@ class LightTable:
     def release(self) -> None:
         """Free the texture."""
         self._texture.release()
+
+
+def _change(before: tuple[NDArray[Any], ...] | None, now: tuple[NDArray[Any], ...]) -> float:
+    """The most that the diffuse light of any normal differs between two versions."""
+    if before is None or len(before[0]) != len(now[0]):
+        return np.inf
+    turned = np.linalg.norm(now[0] - before[0], axis=1) @ now[1]
+    brighter = np.abs(now[1] - before[1]).sum(axis=0) + np.abs(now[2] - before[2])
+    return float(np.max(turned + brighter))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from impostor.lighting import Gloss
 from impostor.model import Material, Model, Primitive
+from runtime.checks import numbers
 from runtime.gl_state import CallerState, set_state
 from runtime.gpu import SRGB8_ALPHA8, InstanceBuffer, check_texture_size, load_program, set_uniforms
 from runtime.instances import Viewer
@@ -108,6 +109,22 @@ class MeshInstance:
     buffers: MeshBuffers
     world_from_model: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
     gloss: Gloss = field(default_factory=Gloss)
+
+
+def check_places(meshes: Sequence[MeshInstance]) -> None:
+    """Refuse a `world_from_model` that has become something else than a finite (4, 4) matrix.
+
+    Raises
+    ------
+    SettingsError
+    """
+    try:
+        matrices = np.array([mesh.world_from_model for mesh in meshes], float)
+    except (TypeError, ValueError):
+        matrices = np.empty(0)
+    if len(meshes) and (matrices.shape != (len(meshes), 4, 4) or not np.isfinite(matrices).all()):
+        for mesh in meshes:
+            numbers(mesh.buffers.model.name, "world_from_model", mesh.world_from_model, (4, 4))
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,8 @@ from runtime.grounds import GroundPass, GroundSurface
 from runtime.impostors import Batch, ImpostorPass
 from runtime.instances import Instances, Viewer
 from runtime.lights import LightTable, check_lights
-from runtime.meshes import OUTPUTS, MeshBuffers, MeshInstance, MeshPass
+from runtime.lod import FrameClock, LevelOfDetail, Levels, check_same_object
+from runtime.meshes import OUTPUTS, MeshBuffers, MeshInstance, MeshPass, check_places
 from runtime.shadows import ShadowPass
 from runtime.surfaces import Surface, SurfacePass
 
@@ -69,6 +70,7 @@ class ImpostorRenderer:
             self._impostors = ImpostorPass(ctx, cache_side)
             self._mesh_pass, self._ground_pass, self._shadows = MeshPass(ctx), GroundPass(ctx), ShadowPass(ctx)
             self._surface_pass, self._table = SurfacePass(ctx), LightTable(ctx)
+        self._clock, self._statistics = FrameClock(), self._mesh_pass.statistics
         self._batches: list[Batch] = []
         self._meshes: list[MeshInstance] = []
         self._surfaces: list[Surface] = []
@@ -101,21 +103,43 @@ class ImpostorRenderer:
         yaws: ArrayLike = 0.0,
         scales: ArrayLike = 1.0,
         gloss: Gloss | None = None,
+        *,
+        model: Model | None = None,
+        level_of_detail: LevelOfDetail | None = None,
     ) -> Instances:
         """Place copies of a fan; see `Instances`. A fan that was added before shares its textures.
+
+        Parameters
+        ----------
+        fan, positions, yaws, scales, gloss
+            As `Instances`.
+        model : Model, optional
+            What the fan was baked from: copies near the camera are drawn as this mesh. Their shadows stay the fan's.
+        level_of_detail : LevelOfDetail, optional
+            Where near begins.
 
         Raises
         ------
         SettingsError
-            What `Instances` cannot be made of.
+            What `Instances` cannot be made of; a model of another object or turned another way; a level of detail
+            without a model.
         """
         self._check_in_use()
         instances = Instances(fan, positions, yaws, scales, gloss)
+        levels = None
+        if model is not None:
+            check_type("model", model, Model, ", as impostor.load_model gives")
+            check_same_object(fan, model)
+            settings = LevelOfDetail() if level_of_detail is None else level_of_detail
+            check_type("level_of_detail", settings, LevelOfDetail)
+            levels = Levels(instances, self._mesh_buffers(model), settings)
+        elif level_of_detail is not None:
+            raise SettingsError(fan.name, "a level of detail without a model; expected the model that was baked")
         textures = next((batch.textures for batch in self._batches if batch.instances.fan is fan), None)
         if textures is None:
             with preserved_state(self._ctx):
                 textures = FanTextures(self._ctx, fan)
-        self._batches.append(Batch(instances, textures))
+        self._batches.append(Batch(instances, textures, levels))
         return instances
 
     def add_mesh(self, model: Model, world_from_model: ArrayLike | None = None, gloss: Gloss | None = None):
@@ -145,11 +169,7 @@ class ImpostorRenderer:
         matrix = np.array(numbers(model.name, "world_from_model", given, (4, 4)))
         if not abs(np.linalg.det(matrix)) > 0:
             raise SettingsError(model.name, "world_from_model has no inverse; expected a matrix that has one")
-        buffers = next((mesh.buffers for mesh in self._meshes if mesh.buffers.model is model), None)
-        if buffers is None:
-            with preserved_state(self._ctx):
-                buffers = MeshBuffers(self._ctx, model)
-        self._meshes.append(MeshInstance(buffers, matrix, gloss or Gloss()))
+        self._meshes.append(MeshInstance(self._mesh_buffers(model), matrix, gloss or Gloss()))
         return self._meshes[-1]
 
     def add_surface(
@@ -189,13 +209,36 @@ class ImpostorRenderer:
                 self._impostors.forget()
                 self._shadows.forget(batch.instances.fan)
                 batch.textures.release()
-        for mesh in meshes:
-            if not any(other.buffers is mesh.buffers for other in self._meshes):
-                mesh.buffers.release()
+        used = self._buffers_in_use()
+        owners = [*meshes, *(batch.levels for batch in batches if batch.levels is not None)]
+        for buffers in {id(owner.buffers): owner.buffers for owner in owners}.values():
+            if id(buffers) not in used:
+                buffers.release()
+
+    def advance(self, seconds: float) -> None:
+        """Tell the time that has passed since the last frame, once a frame, before it is drawn.
+
+        The next `draw` chooses the levels of detail for its viewer and carries crossfades on by so much; more draws of
+        the same frame, for mirrors or other viewports, show the same levels. In a renderer that is never told the time
+        every draw chooses for itself, and levels change at once. Infinitely many seconds end all crossfades, as after
+        a cut to another camera.
+
+        Parameters
+        ----------
+        seconds : float
+            At least 0.
+
+        Raises
+        ------
+        SettingsError
+            Another number, or none.
+        """
+        self._clock.advance(seconds)
 
     def draw(self, clip_from_view: ArrayLike, view_from_world: ArrayLike, output: str = "lit") -> None:
         """Draw every visible instance: far to near, premultiplied and blended; depth is tested and written.
 
+        Copies whose level of detail is the mesh are drawn first; see `advance` for how they become that.
         Draw opaque things and shadows first, so that the edges blend with what is behind them.
 
         Parameters
@@ -213,6 +256,12 @@ class ImpostorRenderer:
         """
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
             self._update_lights(output)
+            levels, seconds = [batch.levels for batch in self._batches if batch.levels is not None], self._clock.take()
+            for each in levels:
+                each.update(viewer, seconds)
+            near = [copies for each in levels for copies in each.copies()]
+            self._mesh_pass.draw_copies(state, near, viewer, self._table, output)
+            self._statistics = self._mesh_pass.statistics
             self._impostors.draw(state, self._batches, viewer, self._table, output)
 
     def draw_meshes(self, clip_from_view: ArrayLike, view_from_world: ArrayLike, output: str = "lit") -> None:
@@ -253,13 +302,24 @@ class ImpostorRenderer:
             fans = [batch.instances for batch in self._batches]
             self._shadows.draw(state, fans, self._meshes, viewer, self.lights, self.ambient, ground)
 
+    def _buffers_in_use(self) -> dict[int, MeshBuffers]:
+        levels = [batch.levels for batch in self._batches if batch.levels is not None]
+        return {id(owner.buffers): owner.buffers for owner in (*self._meshes, *levels)}
+
+    def _mesh_buffers(self, model: Model) -> MeshBuffers:
+        """A model's buffers, shared by everything that draws it."""
+        for buffers in self._buffers_in_use().values():
+            if buffers.model is model:
+                return buffers
+        with preserved_state(self._ctx):
+            return MeshBuffers(self._ctx, model)
+
     @contextmanager
     def _frame(self, clip_from_view: ArrayLike, view_from_world: ArrayLike) -> Iterator[tuple[CallerState, Viewer]]:
         """The caller's state, put back at the end, and the viewer; what may have become impossible is refused."""
         self._check_in_use()
         check_lights(self._lights)
-        for mesh in self._meshes:
-            numbers(mesh.buffers.model.name, "world_from_model", mesh.world_from_model, (4, 4))
+        check_places(self._meshes)
         with preserved_state(self._ctx) as state:
             yield state, Viewer.from_matrices(clip_from_view, view_from_world, state.viewport)
 
@@ -277,14 +337,19 @@ class ImpostorRenderer:
 
     @property
     def statistics(self) -> dict[str, int]:
-        """Of the last draw: instances, tiles, relit tiles, mip levels lost to a full cache."""
-        return dict(self._impostors.statistics)
+        """Of the last `draw`.
+
+        `instances` drawn as fans; `meshes` drawn for copies near the camera, and their `triangles`; copies that are
+        `fading`, and so counted in both; `triangles_spared` by fans of copies that have a mesh; `tiles`, `relit` tiles,
+        and mip levels lost to a full cache (`coarser`).
+        """
+        return {**self._impostors.statistics, **self._statistics}
 
     def release(self) -> None:
         """Free everything on the GPU; the context stays the caller's."""
         for textures in {id(batch.textures): batch.textures for batch in self._batches}.values():
             textures.release()
-        for buffers in {id(mesh.buffers): mesh.buffers for mesh in self._meshes}.values():
+        for buffers in self._buffers_in_use().values():
             buffers.release()
         self._batches.clear()
         self._meshes.clear()

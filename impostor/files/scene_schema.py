@@ -1,9 +1,9 @@
-"""What a scene file may say: every key, its kind, range and default. SCENE.md, beside this file, is the normative text."""
+"""What a scene file may say: every key, its kind, range and default. SCENE.md is the normative text."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -74,8 +74,7 @@ class Choice:
 
     @property
     def expected(self) -> str:
-        words = [f'"{option}"' if isinstance(option, str) else str(option) for option in self.options]
-        return f"{', '.join(words[:-1])} or {words[-1]}"
+        return _either([f'"{option}"' if isinstance(option, str) else str(option) for option in self.options])
 
     def read(self, value: Any) -> Any:
         if isinstance(value, bool) or not isinstance(value, (str, int)) or value not in self.options:
@@ -135,17 +134,19 @@ class Range:
 
 @dataclass(frozen=True)
 class Color:
-    """Linear numbers, or sRGB as a string."""
+    """Linear numbers, one of them for a grey, or sRGB as a string."""
 
     high: float
 
     @property
     def expected(self) -> str:
-        return f'three linear numbers from 0 to {_digits(self.high)}, or "#rrggbb" on the sRGB curve'
+        return f'one or three linear numbers from 0 to {_digits(self.high)}, or "#rrggbb" on the sRGB curve'
 
     def read(self, value: Any) -> tuple[float, ...]:
         if isinstance(value, str) and _HEX_COLOR.fullmatch(value):
             return tuple(linear_from_srgb([int(value[at : at + 2], 16) / 255 for at in (1, 3, 5)]).tolist())
+        if _is_number(value):
+            value = [value] * 3
         return Numbers(3, Number(0, self.high)).read(value)
 
 
@@ -167,7 +168,7 @@ class FileName:
 
     @property
     def expected(self) -> str:
-        return f"the path of a {', '.join(self.suffixes)} file"
+        return f"the path of a {_either(self.suffixes)} file"
 
     def read(self, value: Any) -> str:
         if not isinstance(value, str) or "\0" in value or not value.lower().endswith(self.suffixes):
@@ -184,6 +185,7 @@ class Table:
 @dataclass(frozen=True)
 class Tables:
     keys: Mapping[str, Key]
+    most: int
     expected = "tables, each below a header in double brackets"
 
 
@@ -241,7 +243,7 @@ CAMERA = {
     "near": Key(_LENGTH, None, "m"),
     "far": Key(_LENGTH, None, "m"),
     "walking_height": Key(_LENGTH, 1.7, "m"),
-    "path": Key(Tables(CAMERA_PATH)),
+    "path": Key(Tables(CAMERA_PATH, 10_000)),
 }
 LIGHT = {
     "azimuth_deg": Key(_TURN, REQUIRED, "degrees"),
@@ -280,7 +282,6 @@ SCATTER = {
     "seed": Key(Whole(0, 2**32 - 1), 0),
     "yaw_deg": Key(_TURN, None, "degrees"),
     "scale": Key(Range(_SCALE), [1.0, 1.0]),
-    "sink": Key(Number(-1000, 1000), 0.0, "m"),
 }
 MESH = {"model": Key(FileName(MODEL_SUFFIXES), REQUIRED), **_UP, **_PLACE, "scale": Key(_SCALE, 1.0), **_GLOSS}
 SURFACE = {
@@ -296,13 +297,13 @@ SCENE = {
     "ambient": Key(_LIGHT),
     "background": Key(_ALBEDO),
     "camera": Key(Table(CAMERA), REQUIRED),
-    "light": Key(Tables(LIGHT), []),
+    "light": Key(Tables(LIGHT, 1000), []),
     "sun": Key(Table(SUN)),
     "ground": Key(Table(GROUND)),
-    "instance": Key(Tables(INSTANCE), []),
-    "scatter": Key(Tables(SCATTER), []),
-    "mesh": Key(Tables(MESH), []),
-    "surface": Key(Tables(SURFACE), []),
+    "instance": Key(Tables(INSTANCE, 10_000), []),
+    "scatter": Key(Tables(SCATTER, 256), []),
+    "mesh": Key(Tables(MESH, 10_000), []),
+    "surface": Key(Tables(SURFACE, 10_000), []),
 }
 
 
@@ -312,3 +313,7 @@ def _is_number(value: Any) -> bool:
 
 def _digits(value: float) -> str:
     return f"{value:,.0f}" if value == round(value) else f"{value:g}"
+
+
+def _either(words: Sequence[str]) -> str:
+    return " or ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

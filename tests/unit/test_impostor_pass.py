@@ -9,7 +9,7 @@ from scipy.ndimage import binary_erosion
 
 from impostor.lighting import DirectionalLight, Gloss
 from impostor.views import direction
-from runtime import ImpostorRenderer
+from runtime import ImpostorRenderer, LevelOfDetail
 from runtime.offscreen import Offscreen
 from tests.pictures import apart, bluish, cropped, filling, iou, looking, placed
 from tests.solids import BLUE, GREEN, RED, WHITE, Box, Sphere, card_fan, corner_card, solid_fan, solid_model
@@ -312,6 +312,46 @@ class TestManyCopies:
                 renderer.draw(cropped(matrices[0], column, row, 4), matrices[1], output="albedo")
                 part = expected[64 * row : 64 * row + 64, 64 * column : 64 * column + 64]
                 assert (apart(screen.color(), part) > 4).sum() < 6, (row, column)
+
+
+class TestCrossfade:
+    """A fan whose share falls just short of 1 goes through the crossfade's shader and yet keeps all of its pixels."""
+
+    NEARLY_ONE = np.float32(1 - 1e-6)
+    LEVEL = LevelOfDetail(np.inf, 180.0)
+
+    def test_the_order_stays_far_to_near(self, renderer, draw):
+        """Veils one behind the other, some in a crossfade: each is seen through those before it, as without."""
+        random = np.random.default_rng(0)
+        veil = np.full((16, 16, 4), (255, 255, 255, 100), np.uint8)
+        veil[..., :3] = random.integers(0, 256, 3)
+        card, matrices = card_fan(veil), filling(2.0)
+        model = solid_model(Box((-1, -1, -1), (1, 1, 1)))
+        positions = random.uniform(-1, 1, (60, 3)) * (1.5, 1.5, 3)
+        plain = [renderer.add(card, positions[:40]), renderer.add(PAINTED, positions[40:])]
+        expected = draw(matrices)
+        for placed_before in plain:
+            renderer.remove(placed_before)
+        renderer.add(card, positions[:40], model=model, level_of_detail=self.LEVEL)
+        renderer.add(PAINTED, positions[40:])
+        for fading in ([], [39], [0, 7, 21], range(40)):
+            renderer.advance(0)
+            draw(matrices)
+            renderer._batches[0].levels.fan_share[:] = 1
+            renderer._batches[0].levels.fan_share[list(fading)] = self.NEARLY_ONE
+            # Tiles lie elsewhere in the cache now, which may round a colour the other way.
+            assert apart(draw(matrices), expected).max() <= 3
+            assert renderer.statistics["fading"] == len(fading)
+            assert renderer.statistics["instances"] == 60
+
+    @pytest.mark.parametrize("output", ["lit", "normal"])
+    def test_its_shader_shows_the_same_picture(self, renderer, draw, output):
+        renderer.add(FAN, (0.2, 0.1, 0), 0.5, model=solid_model(BALL), level_of_detail=self.LEVEL)
+        renderer.advance(0)
+        expected = draw(filling(1.5), output)
+        renderer._batches[0].levels.fan_share[:] = self.NEARLY_ONE
+        np.testing.assert_array_equal(draw(filling(1.5), output), expected)
+        assert renderer.statistics["fading"] == 1
 
 
 class TestSizes:

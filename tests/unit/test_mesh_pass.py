@@ -1,5 +1,8 @@
 """Polygon meshes: what a fan is compared with, so each colour is worked out here by hand."""
 
+import dataclasses
+
+import moderngl
 import numpy as np
 import pytest
 
@@ -7,7 +10,8 @@ from impostor.lighting import DirectionalLight, Gloss
 from impostor.model import Material, Model
 from impostor.srgb import srgb_from_linear
 from impostor.views import direction
-from tests.pictures import filling, looking, placed
+from runtime.offscreen import Offscreen
+from tests.pictures import apart, cropped, filling, looking, placed
 from tests.solids import BLUE, GREEN, RED, WHITE, Box, Sphere, corner_card, solid_model
 
 CORNERS = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
@@ -163,6 +167,73 @@ def test_turning_a_mesh_turns_its_light(renderer, draw, screen):
     for picture in pictures[1:]:
         # The facets turn, the light does not.
         assert np.abs(picture[16:48, 16:48].astype(int) - pictures[0][16:48, 16:48]).max() < 6
+
+
+class TestManyCopies:
+    BOX = solid_model(Box((-0.1, -0.1, -0.1), (0.1, 0.1, 0.1), RED))
+
+    @pytest.fixture
+    def draw_calls(self, monkeypatch):
+        """Instances of every draw call since the last look."""
+        calls, rendered = [], moderngl.VertexArray.render
+
+        def spied(array, *arguments, **options):
+            calls.append(options["instances"])
+            return rendered(array, *arguments, **options)
+
+        monkeypatch.setattr(moderngl.VertexArray, "render", spied)
+        return calls
+
+    def test_a_thousand_copies_are_one_draw_call_a_primitive(self, renderer, screen, draw_calls):
+        parts = dataclasses.replace(
+            self.BOX, primitives=self.BOX.primitives + solid_model(Box((0, 0, 0), (0.2, 0.2, 0.2), BLUE)).primitives
+        )
+        for position in np.random.default_rng(0).uniform(-0.7, 0.7, (1000, 3)):
+            renderer.add_mesh(parts, placed(position))
+        renderer.draw_meshes(*filling())
+        assert draw_calls == [1000, 1000]
+
+    def test_copies_of_different_gloss_keep_their_own(self, renderer, draw, screen, draw_calls):
+        gloss = Gloss(1.0, 5.0)
+        positions = [(-0.5, 0, 0), (0.5, 0, 0), (0, 0.5, 0)]
+        alone = []
+        for position, shiny in zip(positions, (False, True, False), strict=True):
+            mesh = renderer.add_mesh(self.BOX, placed(position), gloss if shiny else None)
+            screen.clear()
+            renderer.draw_meshes(*filling())
+            alone.append(screen.color().astype(int))
+            renderer.remove(mesh)
+        for position, shiny in zip(positions, (False, True, False), strict=True):
+            renderer.add_mesh(self.BOX, placed(position), gloss if shiny else None)
+        draw_calls.clear()
+        np.testing.assert_array_equal(draw(), sum(alone))
+        assert draw_calls == [2, 1]
+
+    def test_copies_beside_the_picture_are_not_drawn(self, renderer, screen, draw_calls):
+        for position in ((0, 0, 0), (50, 0, 0), (0, -50, 0), (0, 0, 60)):
+            renderer.add_mesh(self.BOX, placed(position))
+        renderer.draw_meshes(*looking((0, 0, 20)))
+        assert draw_calls == [1]
+
+    @pytest.mark.parametrize("matrices", [filling(1.5, 0.1, 1.2), looking((1, 2, 1.5)), looking((0.5, 0.2, 1.2))])
+    def test_no_part_is_lost_at_the_picture_border(self, ctx, renderer, screen, matrices):
+        """A picture is what 4 x 4 pictures of its parts show, each culled for itself; also of what is sheared."""
+        model = solid_model(Sphere((0.8, 0.1, -0.3), 0.3, RED), Box((-0.2, -0.2, -0.2), (0.2, 0.2, 0.2), BLUE))
+        sheared = placed((0.2, -0.5, 0.1))
+        sheared[:3, :3] = [[1.5, 1.2, 0], [0, 0.7, 0.9], [0.3, 0, 0.4]]
+        for place in (placed((-0.4, 0.3, 0), 1.0, 0.8), placed((0.3, 0.4, -0.5), 4.0, 1.5), sheared):
+            renderer.add_mesh(model, place)
+        whole = Offscreen(ctx, 256, 256)
+        whole.clear()
+        renderer.draw_meshes(*matrices, output="albedo")
+        expected = whole.color()
+        whole.release()
+        for row in range(4):
+            for column in range(4):
+                screen.clear()
+                renderer.draw_meshes(cropped(matrices[0], column, row, 4), matrices[1], output="albedo")
+                part = expected[64 * row : 64 * row + 64, 64 * column : 64 * column + 64]
+                assert (apart(screen.color(), part) > 4).sum() < 6, (row, column)
 
 
 def test_no_meshes_draw_nothing(draw):

@@ -8,6 +8,7 @@ from bake import robust
 from bake.held_out import score
 from bake.photographs import open_photographs
 from bake.ptm import fit_ptm
+from bake.small_products import multiply, solve_symmetric
 from impostor.files.lp_file import read_lp
 from impostor.ptm.normals import normals
 from impostor.ptm.polynomials import evaluate
@@ -60,6 +61,20 @@ def test_photographs_that_are_polynomials_keep_their_coefficients(tmp_path):
     photographs = open_photographs(write_photographs(tmp_path, photographed(known, LIGHTS[:, :2])))
     found = fit_ptm(photographs, LIGHTS[:, :2], format="rgb", robust=True, meaning="view")
     assert np.abs(found.coefficients - known).max() < 0.015
+
+
+def test_many_small_systems_are_solved_as_numpy_does():
+    rng = np.random.default_rng(0)
+    roots, right = rng.normal(size=(50, 6, 6)), rng.normal(size=(50, 6, 2))
+    matrices = roots @ roots.swapaxes(1, 2) + 0.1 * np.eye(6)
+    found = solve_symmetric(np.moveaxis(matrices, 0, -1).copy(), right.swapaxes(0, 1).copy())
+    np.testing.assert_allclose(found.swapaxes(0, 1), np.linalg.solve(matrices, right), rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("columns", [1, 7, 40_000])
+def test_products_by_pieces_are_products(columns):
+    left, right = np.random.default_rng(0).normal(size=(6, 9)), np.random.default_rng(1).normal(size=(3, 9, columns))
+    np.testing.assert_allclose(multiply(left, right), left @ right, rtol=1e-12)
 
 
 @needs_data

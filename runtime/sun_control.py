@@ -1,0 +1,102 @@
+"""The time of day in a walk, and a sun that can be dragged."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from impostor.lighting import DirectionalLight
+from impostor.scene import Scene
+from impostor.sun import Daylight, Lighting, lighting_at, sun_at
+from impostor.views import direction
+
+USUAL_RATE = 0.5  # hours a second, where the scene does not say
+HOURS_A_TURN = 24 / (2 * np.pi)
+HIGHEST = np.radians(89.0)
+
+
+class SunControl:
+    """What a scene is lit by, as time goes on and the sun is dragged about.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Attributes
+    ----------
+    running : bool
+        Whether the time of day goes on.
+    """
+
+    def __init__(self, scene: Scene):
+        self._scene = scene
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin as the scene does."""
+        sun = self._scene.sun
+        self._hours = 12.0 if sun is None else sun.time_of_day
+        self._north = 0.0 if sun is None else sun.north
+        self._lights = self._scene.lights
+        self.running = sun is not None and sun.hours_per_second != 0
+
+    def change(self, scene: Scene, parts: frozenset[str]) -> None:
+        """Go on in another scene, which differs in some parts: from its beginning where its light is another."""
+        self._scene = scene
+        if parts & {"sun", "lights"}:
+            self.reset()
+
+    @property
+    def has_time(self) -> bool:
+        """Whether there is a sun, which has a time of day."""
+        return self._scene.sun is not None
+
+    def step(self, seconds: float) -> None:
+        """Let time go on, if it does."""
+        if self.running and self._scene.sun is not None:
+            self.turn_clock(seconds * (self._scene.sun.hours_per_second or USUAL_RATE))
+
+    def turn_clock(self, hours: float) -> None:
+        """Move the sun along its own way."""
+        self._hours = (self._hours + hours) % 24.0
+
+    def drag(self, right: float, up: float) -> None:
+        """Pull the sun, or where there is none the first light, sideways and up.
+
+        The sun rises as the day does, to noon and no further; sideways its whole way turns.
+
+        Parameters
+        ----------
+        right, up : float
+            Radians.
+        """
+        if self._scene.sun is not None:
+            self._north -= right
+            afternoon = self._hours >= 12
+            hours = self._hours + up * HOURS_A_TURN * (-1 if afternoon else 1)
+            self._hours = float(np.clip(hours, 12.0, 23.999) if afternoon else np.clip(hours, 0.0, 11.999))
+        elif self._lights:
+            first, *others = self._lights
+            x, y, z = first.toward
+            azimuth, elevation = np.arctan2(x, z) - right, np.arcsin(np.clip(y, -1, 1)) + up
+            x, y, z = direction(azimuth, np.clip(elevation, -HIGHEST, HIGHEST)).tolist()
+            self._lights = (DirectionalLight((x, y, z), first.color), *others)
+
+    @property
+    def lighting(self) -> Lighting:
+        """All light of the scene as it is now."""
+        scene = self._scene
+        if scene.sun is not None:
+            return lighting_at(replace(scene, sun=replace(scene.sun, time_of_day=self._hours, north=self._north)))
+        return lighting_at(replace(scene, lights=self._lights))
+
+    @property
+    def words(self) -> str:
+        """Time and place of the sun, for people."""
+        if self._scene.sun is None:
+            return "still"
+        now: Daylight = sun_at(replace(self._scene.sun, north=self._north), self._hours)
+        minutes = round(self._hours * 60) % 1440
+        place = f"azimuth {np.degrees(now.azimuth):.0f}, elevation {np.degrees(now.elevation):.0f} degrees"
+        return f"{minutes // 60:02d}:{minutes % 60:02d}, {place}"
