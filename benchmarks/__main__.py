@@ -10,7 +10,7 @@ import traceback
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks import baking, coding, files, frames, lighting, loading, overhead, quality, report, surfaces
+from benchmarks import baking, coding, crowd, files, frames, lighting, loading, overhead, quality, report, surfaces
 from benchmarks.tables import Table
 from benchmarks.workbench import DATA, Workbench, say
 
@@ -22,6 +22,7 @@ TABLES: dict[str, Callable[[Workbench], Table]] = {
     "lights": lighting.run_lights,
     "colormap": lighting.run_colormap,
     "overhead": overhead.run,
+    "crowd": crowd.run,
     "loading": loading.run,
     "coding": coding.run,
     "quality": quality.run,

@@ -126,7 +126,13 @@ class Field:
         self.renderer.draw(*self.matrices)
 
     def impostors_relit(self) -> None:
-        """A frame of impostors under lights that no frame before had."""
+        """A frame of impostors under lights that are another three degrees on: every tile is relit."""
+        self._turn += 0.05
+        self.renderer.lights = lights(len(self.renderer.lights), self._turn)
+        self.impostors()
+
+    def impostors_under_a_moving_sun(self) -> None:
+        """A frame of impostors under lights that are a twentieth of a degree on."""
         self._turn += 0.001
         self.renderer.lights = lights(len(self.renderer.lights), self._turn)
         self.impostors()

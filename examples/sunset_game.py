@@ -24,7 +24,7 @@ from runtime.animation import AnimatedFan, AnimatedInstances
 
 SAMPLES = Path(__file__).resolve().parents[1] / "sample_models"
 CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "impostor-lantern-wood"
-GROUND = impostor.Ground((0.0, 1.0, 0.0))
+GROUND = impostor.Ground(np.array([0.0, 1.0, 0.0]))
 POSES = 8  # of a tree that sways
 DAY = 80.0  # seconds from the afternoon to the night
 SUN_AZIMUTH_DEG, MOON_AZIMUTH_DEG, MOON_ELEVATION_DEG = 212, 157, 17
@@ -188,47 +188,40 @@ class Picture:
     def draw(self, target, world, seconds):
         """One frame: meshes, ground, shadows, fans, and at last what glows."""
         camera, sky = world.camera(target.width / target.height), world.sky()
-        matrices, inverse = camera.matrices, np.linalg.inv(camera.clip_from_view @ camera.view_from_world)
-        spin, legs = 0.8 * world.time * DAY, np.sin(world.stride) * 0.55
+        clip_from_view, view_from_world = camera.matrices
+        spin, turn = 0.8 * world.time * DAY, rotation_about_y(world.heading)
         lanterns = world.lanterns[world.left] + [0, 0.1, 0] * np.sin(3 * spin + 5 * world.lanterns[world.left, :1])
-        turn = rotation_about_y(world.heading)
         hand = world.place + turn @ [0.3, 0.72, 0.28]
-        glows = np.concatenate([lanterns, hand[None]])
-        nearest = np.argsort(np.linalg.norm(lanterns - world.place, axis=1))[:2]
-        lamps = np.concatenate([hand[None], lanterns[nearest], np.full((2, 3), -1e3)])[:3]
-        eye = -camera.view_from_world[:3, :3].T @ camera.view_from_world[:3, 3]
-        everywhere = sky | {"eye": tuple(eye), "lamps": lamps.tolist(), "time": world.time * DAY, "lit": 1.0}
-        everywhere |= {"clip_from_world": np.linalg.inv(inverse), "world_from_clip": inverse}
-        everywhere |= {"right": camera.view_from_world[0, :3], "up": camera.view_from_world[1, :3]}
-        for program in self.programs.values():
-            for name in everywhere.keys() & set(program):
-                value = np.asarray(everywhere[name], "f4")
-                program[name].write(np.ascontiguousarray(value.T if value.shape == (4, 4) else value))
-
-        self._light(sky)
+        self._tell_shaders(camera, world, sky, np.concatenate([hand[None], lanterns]))
+        self._light_fans(sky)
         self._move_grass(world.place)
         self.trees.advance(seconds)
+
         target.use()
         target.clear(depth=1.0)
         self.ctx.disable(moderngl.DEPTH_TEST | moderngl.BLEND)
         self.sky.render(moderngl.TRIANGLE_STRIP)
         self.ctx.enable(moderngl.DEPTH_TEST)
         for lantern in lanterns:
-            self._mesh("lantern", lantern, rotation_about_y(spin))
-        figure = [("body", (0, 0, 0), 0.0), ("leg", (0.12, 0.42, 0), legs), ("leg", (-0.12, 0.42, 0), -legs)]
-        for name, place, swing in figure:
-            self._mesh(name, world.place + turn @ place, turn @ pitched(swing))
-        self._mesh("lantern", hand - [0, 0.1, 0], turn * 0.8)
-        self._mesh("ground", np.zeros(3), np.eye(3), "ground")
+            self._mesh("lantern", placed(lantern, rotation_about_y(spin)))
+        legs = 0.55 * np.sin(world.stride)
+        parts = ("body", (0, 0, 0), 0.0), ("leg", (0.12, 0.42, 0), legs), ("leg", (-0.12, 0.42, 0), -legs)
+        walker = [(name, placed(world.place + turn @ joint, turn @ pitched(swing))) for name, joint, swing in parts]
+        for name, matrix in walker:
+            self._mesh(name, matrix)
+        self._mesh("lantern", placed(hand - [0, 0.1, 0], 0.8 * turn))
+        self._mesh("ground", np.eye(4), "ground")
+
         self.grass.visible = False
-        self.renderer.draw_shadows(*matrices, GROUND)
+        self.renderer.draw_shadows(clip_from_view, view_from_world, GROUND)
         # The walker's shadow: the mesh, flattened along the light, as ground that the light does not reach.
         self.programs["ground"]["lit"] = 0.0
-        flat = flattened(sky["sun"] if max(sky["sunlight"]) > 0 else sky["moon"])
-        for name, place, swing in figure:
-            self._mesh(name, world.place + turn @ place, turn @ pitched(swing), "ground", flat)
+        for name, matrix in walker:
+            self._mesh(name, flattened(sky["sun"] if max(sky["sunlight"]) > 0 else sky["moon"]) @ matrix, "ground")
         self.grass.visible = True
-        self.renderer.draw(*matrices)
+        self.renderer.draw(clip_from_view, view_from_world)
+
+        glows = np.concatenate([hand[None], lanterns])
         self.glows.write(np.hstack([glows, np.full((len(glows), 1), 0.9)]).astype("f4"))
         self.ctx.enable(moderngl.BLEND)
         self.ctx.blend_func = moderngl.ONE, moderngl.ONE
@@ -237,7 +230,20 @@ class Picture:
         target.depth_mask = True
         self.ctx.disable(moderngl.BLEND)
 
-    def _light(self, sky):
+    def _tell_shaders(self, camera, world, sky, lights):
+        """Give every program the uniforms it has; the three nearest lanterns light the ground and the walker."""
+        clip_from_world = camera.clip_from_view @ camera.view_from_world
+        right, up, _ = camera.view_from_world[:3, :3]
+        eye = -camera.view_from_world[:3, :3].T @ camera.view_from_world[:3, 3]
+        nearest = np.argsort(np.linalg.norm(lights - world.place, axis=1))[:3]
+        lamps = np.concatenate([lights[nearest], np.full((3, 3), -1e3)])[:3]
+        values = {"clip_from_world": clip_from_world.T, "world_from_clip": np.linalg.inv(clip_from_world).T, **sky}
+        values |= {"right": right, "up": up, "eye": eye, "lamps": lamps, "time": world.time * DAY, "lit": 1.0}
+        for program in self.programs.values():
+            for name in values.keys() & set(program):
+                program[name].write(np.ascontiguousarray(values[name], "f4"))
+
+    def _light_fans(self, sky):
         lights = [(sky["sun"], sky["sunlight"]), (sky["moon"], sky["moonlight"])]
         self.renderer.lights = [impostor.DirectionalLight(*light) for light in lights if max(light[1]) > 0]
         self.renderer.ambient = sky["ambient"]
@@ -252,13 +258,16 @@ class Picture:
         # A copy of no size is left out.
         self.grass.scales[:] = self.height * full * ~on_path
 
-    def _mesh(self, name, place, turn, program="mesh", flat=None):
-        matrix = np.eye(4)
-        matrix[:3, :3], matrix[:3, 3] = turn, place
-        if flat is not None:
-            matrix = flat @ matrix
-        self.programs[program]["world_from_mesh"].write(np.ascontiguousarray(matrix.T, "f4"))
+    def _mesh(self, name, world_from_mesh, program="mesh"):
+        self.programs[program]["world_from_mesh"].write(np.ascontiguousarray(world_from_mesh.T, "f4"))
         self.meshes[name][program].render()
+
+
+def placed(place, turn):
+    """The matrix (4, 4) of a turn and a place."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = turn, place
+    return matrix
 
 
 def pitched(angle):
@@ -291,7 +300,7 @@ def play(world, made, size):
     while True:
         seconds = min(clock.tick(60) / 1000, 0.1)
         for event in pygame.event.get():
-            if event.type == pygame.QUIT or event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE:
+            if event.type == pygame.QUIT or (event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE):
                 pygame.quit()
                 return
         held = pygame.key.get_pressed()

@@ -24,7 +24,9 @@ float noise(vec2 p) {
     vec2 i = floor(p), f = fract(p), u = f * f * (3.0 - 2.0 * f);
     return mix(mix(hash(i), hash(i + vec2(1, 0)), u.x), mix(hash(i + vec2(0, 1)), hash(i + 1.0), u.x), u.y);
 }
-vec3 srgb(vec3 c) { return mix(c * 12.92, 1.055 * pow(clamp(c, 0.0, 1.0), vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c)); }
+vec3 srgb(vec3 c) {
+    return mix(c * 12.92, 1.055 * pow(clamp(c, 0.0, 1.0), vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c));
+}
 vec3 light(vec3 n, float lit) {
     return ambient + lit * (sunlight * max(dot(n, sun), 0.0) + moonlight * max(dot(n, moon), 0.0));
 }
@@ -68,7 +70,8 @@ void main() {
     for (int i = 2; i > 0; i--) {
         float k = float(i), rough = 0.3 * noise(level * (17.0 * k)) + 0.12 * noise(level * 60.0);
         float hill = 0.012 * k + 0.06 * (0.7 * noise(level * (2.3 + 2.0 * k) + 9.0 * k) + rough);
-        c = mix(c, mix(zenith * 0.6, sky(vec3(ray.x, 0.0, ray.z)), 0.25 + 0.22 * k), smoothstep(hill, hill - 0.002, ray.y));
+        vec3 haze = mix(zenith * 0.6, sky(vec3(ray.x, 0.0, ray.z)), 0.25 + 0.22 * k);
+        c = mix(c, haze, smoothstep(hill, hill - 0.002, ray.y));
     }
     color = vec4(c + (hash(gl_FragCoord.xy) - 0.5) / 128.0, 1.0);
 }"""

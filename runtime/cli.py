@@ -45,13 +45,16 @@ Method = Annotated[str, typer.Option(metavar="nearest", help="How views between 
 
 def register(app: typer.Typer) -> None:
     """Add this stage's commands."""
+    from runtime.walk_cli import walk
+
     app.command("render")(render)
     app.command("compare")(compare)
+    app.command("walk")(walk)
 
 
 @as_flags("output", fov_deg="--fov")
 def render(
-    subject: Annotated[Path, typer.Argument(metavar="FAN|MODEL")],
+    subject: Annotated[Path, typer.Argument(metavar="FAN|MODEL|SCENE")],
     output_file: Annotated[Path, typer.Option("-o", metavar="OUT.png")],
     size: Annotated[str, typer.Option(metavar="WxH")] = "512x512",
     azimuth: Annotated[float | None, typer.Option(metavar="DEG", help="Of an orthographic camera; 0.")] = None,
@@ -72,7 +75,19 @@ def render(
     allow_missing_textures: AllowMissing = False,
     force: Force = False,
 ) -> None:
-    """Draw a fan, or a mesh through the same camera and lights, as a PNG."""
+    """Draw a fan, a mesh through the same camera and lights, or what a scene's camera sees first, as a PNG."""
+    if subject.suffix.lower() == ".toml":
+        from runtime.walk_cli import render_scene
+
+        of_one_object = {"--light": light, "--ambient": ambient, "--gloss": gloss, "--background": background}
+        of_one_object |= {"--azimuth": azimuth, "--elevation": elevation, "--up": up}
+        of_one_object |= {"--allow-missing-textures": allow_missing_textures or None}
+        for flag, value in of_one_object.items():
+            if value is not None:
+                raise SettingsError(flag, f"given with {subject}; expected it with a fan or a model, not with a scene")
+        given = {"eye": eye and _numbers("--eye", eye, 3), "target": target and _numbers("--target", target, 3)}
+        render_scene(subject, output_file, _size(size), output, not no_shadow, {**given, "fov_deg": fov}, force)
+        return
     from impostor.files.pictures import save_png
     from runtime.pictures import PictureSettings, draw_picture
 

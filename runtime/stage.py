@@ -100,6 +100,7 @@ class Stage:
         self._copies: Shelf[Copies] = Shelf(self._remove_copies)
         self._meshes: Shelf[MeshInstance] = Shelf(self.renderer.remove)
         self._surfaces: Shelf[Surface] = Shelf(self.renderer.remove)
+        self._floors: Shelf[Surface] = Shelf(self.renderer.remove)
         try:
             self.change(scene)
         except BaseException:
@@ -121,6 +122,7 @@ class Stage:
             (self._copies, {key: partial(self._add_copies, placement) for key, placement in keys.items()}),
             (self._meshes, self._wanted_meshes(scene)),
             (self._surfaces, self._wanted_surfaces(scene)),
+            (self._floors, self._wanted_floor(scene.ground)),
         ]
         try:
             for shelf, wanted in exchanges:
@@ -286,9 +288,9 @@ class Stage:
     def _lay_floor(self, camera: Camera) -> None:
         """A ground with a PTM is a surface, which goes with the eye."""
         ground = self.scene.ground
-        if ground is not None and ground.ptm is not None:
-            floor = next(thing for key, thing in self._surfaces.things.items() if key[0] == ground)
-            floor.world_from_model = lying_on(ground.plane, _under(ground, camera))
+        if ground is not None:
+            for floor in self._floors.things.values():
+                floor.world_from_model = lying_on(ground.plane, _under(ground, camera))
 
     def _draw_overdraw(self, canvas: Canvas, camera: Camera) -> None:
         canvas.clear((0.0, 0.0, 0.0, 1.0))
@@ -342,10 +344,13 @@ class Stage:
         for surface in scene.surfaces:
             ptm = self._assets.ptm(surface.ptm)
             wanted[_free(wanted, surface, ptm)] = partial(self._add_surface, surface, ptm)
-        if scene.ground is not None and scene.ground.ptm is not None:
-            ptm = self._assets.ptm(scene.ground.ptm)
-            wanted[_free(wanted, scene.ground, ptm)] = partial(self._add_floor, scene.ground, ptm)
         return wanted
+
+    def _wanted_floor(self, ground: SceneGround | None) -> Mapping[Hashable, Callable[[], Surface]]:
+        if ground is None or ground.ptm is None:
+            return {}
+        ptm = self._assets.ptm(ground.ptm)
+        return {(ground, id(ptm)): partial(self._add_floor, ground, ptm)}
 
     def _add_surface(self, surface: SceneSurface, ptm: Ptm) -> Surface:
         model = rectangle(surface.width, surface.height)

@@ -19,7 +19,7 @@ def density() -> np.ndarray:
     row, column = np.mgrid[:SIDE, :SIDE]
     x, z = (column + 0.5) / SIDE * 2 - 1, (row + 0.5) / SIDE * 2 - 1
     clearing = np.clip((np.hypot(x, z) - 0.13) / 0.08, 0, 1)
-    path = np.clip((np.abs(x - 0.12 * np.sin(5 * z)) - 0.02) / 0.02, 0, 1)
+    path = np.clip((np.abs(x - 0.12 * np.sin(5 * z)) - 0.035) / 0.02, 0, 1)
     patches = 0.7 + 0.3 * np.sin(7 * x + 2 * np.sin(3 * z)) * np.sin(6 * z + np.sin(4 * x))
     return np.round(255 * clearing * path * patches).astype(np.uint8)
 

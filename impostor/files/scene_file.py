@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from impostor.errors import SceneWarning, SettingsError
+from impostor.errors import SceneFileError, SceneWarning, SettingsError
 from impostor.files.baked_fans import baked_fan_path, model_files
 from impostor.files.scene_document import Document
 from impostor.files.scene_schema import BAKE, MOST_COPIES, SCENE
@@ -161,25 +161,21 @@ class _Reader:
 
     def _subject(self, table: Table, place: Place) -> tuple[Subject, Gloss, bool]:
         fan, model, lod, up = table["fan"], table["model"], table["lod"], table["up"]
-        if model is None and (fan is None or lod):
-            where = (*place, "lod") if lod else place
-            raise self.document.error(
-                where, "a model beside it" if lod else "a fan or a model", None if lod else "none"
-            )
+        if lod and model is None:
+            raise self.document.error((*place, "lod"), "a model beside it")
         if fan is not None and model is not None and not lod:
             raise self.document.error((*place, "model"), "lod = true beside a fan and a model, or one of them")
         if fan is not None and table["bake"] is not None:
             raise self.document.error((*place, "bake"), "none, since the fan is baked", "a table")
         if model is not None:
-            self._note("instances", *self._model_files(model, place))
+            self._note_model("instances", model, place)
         if fan is not None:
             self._note("instances", fan)
             subject = Subject(fan, model, up)
-        elif model is None:
-            raise self.document.error(place, "fan or model", "no subject")
+        elif model is not None:
+            subject = self._baked(model, self._bake(table["bake"], up, (*place, "bake")), place)
         else:
-            settings = self._bake(table["bake"], up, (*place, "bake"))
-            subject = Subject(baked_fan_path(self.document.folder, model, settings), model, up, settings)
+            raise self.document.error(place, "fan or model", "no subject")
         return subject, Gloss(table["gloss"], table["shininess"]), lod
 
     def _bake(self, table: Table | None, up: str, place: Place) -> BakeSettings:
@@ -191,11 +187,21 @@ class _Reader:
             raise self.document.error((*place, "elevation_deg"), "it of a ring only")
         return BakeSettings(up=up, **values)
 
-    def _model_files(self, model: Path, place: Place) -> tuple[Path, ...]:
+    def _baked(self, model: Path, settings: BakeSettings, place: Place) -> Subject:
         try:
-            return model_files(model)
+            return Subject(baked_fan_path(self.document.folder, model, settings), model, settings.up, settings)
         except OSError as error:
-            raise self.document.error((*place, "model"), "a file that can be read", f"{error.strerror}") from None
+            raise self._unreadable(error, place) from None
+
+    def _note_model(self, part: str, model: Path, place: Place) -> None:
+        try:
+            self._note(part, *model_files(model))
+        except OSError as error:
+            raise self._unreadable(error, place) from None
+
+    def _unreadable(self, error: OSError, place: Place) -> SceneFileError:
+        found = f"{Path(error.filename or '').name!r} cannot be read: {error.strerror}"
+        return self.document.error((*place, "model"), "a model that can be", found)
 
     def _add(self, key: tuple[Subject, Gloss, bool], *arrays: NDArray[np.float64]) -> None:
         self.copies.setdefault(key, []).append(arrays)
@@ -264,7 +270,7 @@ class _Reader:
             raise self.document.error(place, expected) from None
 
     def _mesh(self, table: Table, place: Place) -> SceneMesh:
-        self._note("meshes", *self._model_files(table["model"], place))
+        self._note_model("meshes", table["model"], place)
         return SceneMesh(
             table["model"],
             table["up"],

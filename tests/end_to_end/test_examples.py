@@ -113,7 +113,7 @@ for piece in sys.stdin.read().split("\\0"):
 
 def test_the_code_on_the_page_runs_as_pasted(tmp_path):
     pieces = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "embedding.md").read_text(), re.DOTALL)
-    assert len(pieces) == 7
+    assert len(pieces) == 9
     (tmp_path / "sample_models").symlink_to(SAMPLES)
     save(tmp_path / "tree.fan", bake_fan(load_model(SAMPLES / "tree.glb"), views=12, size=48))
     done = subprocess.run(

@@ -187,3 +187,16 @@ def test_hostile_files_end_soon(folder, text, problem):
 def test_no_scene_file(folder, path, problem):
     with pytest.raises(SceneFileError, match=problem):
         load_scene(folder / path)
+
+
+@pytest.mark.parametrize("header", ["[[instance]]", "[[mesh]]"])
+def test_a_model_that_may_not_be_read(folder, header, monkeypatch):
+    def refuse(path):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr("impostor.files.baked_fans._stamp", refuse)
+    message = refused(folder, f"{CAMERA}{header}\nmodel = 'a.glb'")
+    kind = header.strip("[]")
+    assert (
+        message == f"line 5: {kind}[0].model: 'a.glb' cannot be read: Permission denied; expected a model that can be"
+    )
