@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from bake.photographs import PhotographError, Photographs, open_photographs
-from impostor.errors import SettingsError
+from bake.photographs import Photographs, open_photographs
+from impostor.errors import PhotographError, SettingsError
 
 SMALLEST_RADIUS = 4.0  # pixels
 HIGHLIGHT = 0.9  # of the brightest value on the ball: what counts as the light's image

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from impostor.errors import ImpostorError
+from impostor.errors import PhotographError
 
 FORMATS = ("JPEG", "PNG", "TIFF", "TGA", "BMP", "PPM", "WEBP")
 MAX_TEXELS = 80_000_000  # a fit holds 72 bytes a texel: what a header may ask for has an end
@@ -32,10 +32,6 @@ TURNS = {
 SIDEWAYS = {TURNS[tag] for tag in (5, 6, 7, 8)}
 GRAY_MODES = ("1", "L", "LA", "La")
 DEEP_MODES = ("I;16", "I;16B", "I;16L", "I;16N", "I")
-
-
-class PhotographError(ImpostorError):
-    """A photograph that cannot be decoded, or that does not fit to the others of its capture set."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import traceback
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks import baking, coding, crowd, files, frames, lighting, loading, overhead, quality, report, surfaces
+from benchmarks import baking, coding, crowd, files, frames, lighting, loading, overhead, ptm, quality, report, surfaces
 from benchmarks.tables import Table
 from benchmarks.workbench import DATA, Workbench, say
 
@@ -27,6 +27,8 @@ TABLES: dict[str, Callable[[Workbench], Table]] = {
     "coding": coding.run,
     "quality": quality.run,
     "surfaces": surfaces.run,
+    "ptm": ptm.run_quality,
+    "ptm_fit": ptm.run_fit,
 }
 
 

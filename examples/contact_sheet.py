@@ -8,7 +8,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageOps
 
 import impostor
 from bake.fan import bake_fan
@@ -37,8 +37,8 @@ for row, fan in enumerate(fans):
     renderer.add(fan)
     center, radius = fan.bounds.mean(axis=0), fan.radius
     ground = impostor.Ground(np.array([0.0, 1.0, 0.0]), fan.bounds[0, 1])
-    middle = (center[0], fan.bounds[0, 1], center[2])
-    floor = GroundSurface((0.52, 0.50, 0.46), middle=middle, reach=1.7 * radius, background=(0.93, 0.92, 0.89, 1.0))
+    # As bright under this light as the paper is, so that the shadows are all one sees of it.
+    floor = GroundSurface((0.945, 0.967, 0.945), middle=tuple(center.tolist()), reach=100 * radius)
     for column in range(COLUMNS):
         sheet.viewport = column * cell, (len(fans) - 1 - row) * cell, cell, cell
         sheet.use()
@@ -52,5 +52,5 @@ for row, fan in enumerate(fans):
     renderer.release()
 flat = ctx.simple_framebuffer(size)
 ctx.copy_framebuffer(flat, sheet)
-Image.frombytes("RGB", size, flat.read()).transpose(Image.Transpose.FLIP_TOP_BOTTOM).save(given.out)
+ImageOps.flip(Image.frombytes("RGB", size, flat.read())).save(given.out)
 print(f"{given.out}: {len(fans)} fans from {COLUMNS} sides")

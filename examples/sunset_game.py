@@ -13,7 +13,7 @@ from pathlib import Path
 
 import moderngl
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageOps
 from sunset_look import BODY, CORNERS, GROUND_VERTICES, LANTERN, LEG, SHADERS, SKY, TUFT
 
 import impostor
@@ -288,7 +288,7 @@ def play(world, made, size):
     """In a window, until it is closed."""
     import pygame
 
-    pygame.init()
+    pygame.display.init()
     for name, value in (("CONTEXT_MAJOR_VERSION", 3), ("CONTEXT_MINOR_VERSION", 3), ("MULTISAMPLEBUFFERS", 1)):
         pygame.display.gl_set_attribute(getattr(pygame, f"GL_{name}"), value)
     pygame.display.gl_set_attribute(pygame.GL_CONTEXT_PROFILE_MASK, pygame.GL_CONTEXT_PROFILE_CORE)
@@ -321,8 +321,7 @@ def record(world, made, size, frames, step, out):
         world.update(step, *world.way_to_lantern())
         picture.draw(screen, world, step)
     ctx.copy_framebuffer(flat, screen)
-    pixels = np.frombuffer(flat.read(), np.uint8).reshape(size[1], size[0], 3)[::-1]
-    Image.fromarray(pixels).save(out)
+    ImageOps.flip(Image.frombytes("RGB", size, flat.read())).save(out)
     print(f"{out}: {world.score} of {LANTERNS} lanterns after {frames} frames")
 
 

@@ -73,7 +73,7 @@ def main(arguments: list[str] | None = None) -> int:
     except (KeyboardInterrupt, typer.Abort):
         return _fail("stopped", INTERRUPTED)
     except MemoryError:
-        return _fail("not enough memory; expected room for all views: a smaller --size or fewer --views take less", 1)
+        return _fail("not enough memory; smaller or fewer pictures take less", 1)
     except BrokenPipeError:
         sys.stderr.close()  # whoever read our output has gone
         return 1

@@ -37,6 +37,10 @@ class OutputError(ImpostorError):
     """An output that exists already, or a place that cannot be written."""
 
 
+class PhotographError(ImpostorError):
+    """A photograph that cannot be decoded, or that does not fit to the others of its capture set."""
+
+
 class SettingsError(ImpostorError):
     """A number or choice outside what the command or function takes."""
 

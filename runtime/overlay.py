@@ -79,12 +79,10 @@ class Overlay:
     Parameters
     ----------
     ctx : moderngl.Context
-    font_size : int
-        Pixels.
     """
 
-    def __init__(self, ctx: moderngl.Context, font_size: int = 14):
-        self._ctx, self._font_size = ctx, font_size
+    def __init__(self, ctx: moderngl.Context):
+        self._ctx = ctx
         self._program = load_program(ctx, "overlay.vert", "overlay.frag")
         self._distance_program = load_program(ctx, "overlay.vert", "distance.frag")
         self._corners = ctx.buffer(CORNERS)
@@ -94,9 +92,9 @@ class Overlay:
         )
         self._white = ctx.texture((1, 1), 4, b"\xff\xff\xff\xff")
         self._black = ctx.texture((1, 1), 4, b"\x00\x00\x00\xff")
-        self._texts: dict[tuple[Row, ...], moderngl.Texture] = {}
+        self._texts: dict[tuple[int, tuple[Row, ...]], moderngl.Texture] = {}
 
-    def draw_panels(self, size: tuple[int, int], panels: Sequence[Panel]) -> None:
+    def draw_panels(self, size: tuple[int, int], panels: Sequence[Panel], font_size: int) -> None:
         """Draw text; a picture of each panel is kept while it is shown.
 
         Parameters
@@ -104,17 +102,18 @@ class Overlay:
         size : tuple of int
             Of the picture, pixels.
         panels : sequence of Panel
+        font_size : int
+            Pixels.
         """
-        wanted = {panel.rows for panel in panels}
-        for rows in self._texts.keys() - wanted:
-            self._texts.pop(rows).release()
-        for panel in panels:
-            if panel.rows not in self._texts:
-                pixels = panel_picture(panel.rows, self._font_size)
-                texture = self._ctx.texture(pixels.shape[1::-1], 4, pixels.tobytes())
-                texture.filter = moderngl.NEAREST, moderngl.NEAREST
-                self._texts[panel.rows] = texture
-            texture = self._texts[panel.rows]
+        wanted = {(font_size, panel.rows): panel for panel in panels}
+        for key in self._texts.keys() - wanted:
+            self._texts.pop(key).release()
+        for key, panel in wanted.items():
+            if key not in self._texts:
+                pixels = panel_picture(panel.rows, font_size)
+                self._texts[key] = self._ctx.texture(pixels.shape[1::-1], 4, pixels.tobytes())
+                self._texts[key].filter = moderngl.NEAREST, moderngl.NEAREST
+            texture = self._texts[key]
             left, top = (
                 max(min(round(place * whole - anchor * part) + offset, whole - part), 0)
                 for place, anchor, whole, part, offset in zip(

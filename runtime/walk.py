@@ -18,7 +18,7 @@ from runtime.cameras import Camera
 from runtime.canvas import Canvas
 from runtime.draw_calls import counted_draw_calls
 from runtime.frame_statistics import FrameStatistics
-from runtime.overlay import Overlay, Panel, Row
+from runtime.overlay import LEADING, Overlay, Panel, Row
 from runtime.scene_changes import Change, SceneChanges
 from runtime.stage import VIEWS, Stage
 from runtime.sun_control import SunControl
@@ -32,6 +32,8 @@ SPEED, HALF_GREY = 1.8, 7.0  # walking heights: a second, and away in the view o
 MESSAGE_SECONDS = 4.0
 PATIENCE = 0.25  # seconds between two looks at the scene's files, and between two texts of the statistics
 LINE = 80  # characters of a message
+SMALLEST_FONT = 9
+BOTH_WIDE = 58  # font sizes from which on statistics and help have room side by side
 MARGIN = 8  # pixels around what lies over the picture
 
 
@@ -98,8 +100,13 @@ class Walk:
         self._message: tuple[str, ...] = ()
         self._message_left, self._complaint = 0.0, ""
         self._since_look, self._since_rows, self._rows = 0.0, np.inf, ()
-        self.stage = Stage(ctx, scene)
-        self.canvas, self._overlay = Canvas(ctx, *size, samples), Overlay(ctx, font_size)
+        self.canvas = Canvas(ctx, *size, samples)
+        try:
+            self.stage = Stage(ctx, scene)
+        except BaseException:
+            self.canvas.release()
+            raise
+        self._overlay, self._font_size = Overlay(ctx), font_size
         self.walker = self._standing()
 
     @property
@@ -273,7 +280,12 @@ class Walk:
         self._overlay.draw_picture(size, self.canvas.color)
         if self.shown.split is not None:
             self._overlay.draw_divider(size, self.divider)
-        self._overlay.draw_panels(size, self._panels())
+        self._overlay.draw_panels(size, self._panels(), self._fitting_font_size)
+
+    @property
+    def _fitting_font_size(self) -> int:
+        """So that the help fits into a low window, as long as it can be read."""
+        return max(min(self._font_size, int(self.canvas.size[1] / (len(HELP) + 2) / LEADING)), SMALLEST_FONT)
 
     @property
     def divider(self) -> int:
@@ -282,7 +294,7 @@ class Walk:
 
     def _panels(self) -> Sequence[Panel]:
         panels = []
-        if self.shown.statistics:
+        if self.shown.statistics and (self.canvas.size[0] > BOTH_WIDE * self._fitting_font_size or not self.shown.help):
             panels.append(Panel(self._statistics_rows(), (0, 0), (MARGIN, MARGIN)))
         if self.shown.help:
             panels.append(Panel(HELP, (1, 0), (-MARGIN, MARGIN)))
@@ -299,12 +311,13 @@ class Walk:
     def _statistics_rows(self) -> tuple[Row, ...]:
         if self._since_rows >= PATIENCE:
             self._since_rows = 0.0
-            x, y, z = self.walker.eye.tolist()
+            eye = ", ".join(f"{each:.1f}" for each in np.round(self.walker.eye, 1) + 0.0)
+            spared = f"{self.triangles_not_drawn:,} triangles" if self.shown.split is None else "the left side's meshes"
             self._rows = (
                 *self.statistics.rows(),
-                ("not drawn", f"{self.triangles_not_drawn:,} triangles"),
+                ("not drawn", spared),
                 ("sun", self.sun.words),
-                ("eye", f"{x:.1f}, {y:.1f}, {z:.1f} m"),
+                ("eye", f"{eye} m, {'flying' if self.walker.flying else 'walking'}"),
                 ("view", self.shown.view),
             )
         return self._rows

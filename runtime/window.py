@@ -54,6 +54,8 @@ class Window:
             raise GpuError("window", f"cannot be opened ({reason}); expected a display, or --headless") from problem
         self.ctx: moderngl.Context = self._window.ctx
         self.on_picture: Callable[[], None] = lambda: None
+        self._window.exit_key = None  # it would close the window, and its context, before the last picture is kept
+        self._quits = False
         self._actions = {getattr(self._window.keys, name): key.action for name, key in KEYS.items()}
         self._walk: Walk | None = None
         self._buttons: set[int] = set()
@@ -63,6 +65,8 @@ class Window:
         window.mouse_position_event_func = window.mouse_drag_event_func = self._mouse_moved
         window.mouse_press_event_func, window.mouse_release_event_func = self._mouse_pressed, self._mouse_released
         window.mouse_scroll_event_func = self._wheel
+        # Keys that are down when another window comes forward are released unseen; only pyglet tells when that is.
+        window._window.push_handlers(on_deactivate=self._let_all_go)
         self._catch_mouse(catch_mouse)
 
     @property
@@ -90,7 +94,7 @@ class Window:
         self._walk = walk
         last, shown = time.perf_counter(), 0
         try:
-            while not self._window.is_closing and (frames is None or shown < frames):
+            while not (self._quits or self._window.is_closing) and (frames is None or shown < frames):
                 now = time.perf_counter()
                 walk.step(min(now - last, LONGEST_STEP) if step is None else step)
                 last = now
@@ -107,8 +111,7 @@ class Window:
     def close(self) -> None:
         """Let the mouse go and close the window."""
         self._catch_mouse(False)
-        if not self._window.is_closing:
-            self._window.close()
+        self._window.close()
 
     def _catch_mouse(self, caught: bool) -> None:
         if self._window.mouse_exclusivity != caught:
@@ -122,10 +125,18 @@ class Window:
             walk.let_go(meant)
         elif meant == "mouse":
             self._catch_mouse(not self._window.mouse_exclusivity)
+        elif meant == "quit":
+            self._quits = True
         elif meant == "picture":
             self.on_picture()
         else:
             walk.press(meant)
+
+    def _let_all_go(self) -> None:
+        self._buttons.clear()
+        self._drags_divider = False
+        if self._walk is not None:
+            self._walk.held.clear()
 
     def _mouse_moved(self, x: int, y: int, dx: int, dy: int) -> None:
         walk = self._walk

@@ -123,7 +123,7 @@ def quantise(polynomials: Polynomials, scale: ArrayLike | None = None, bias: Arr
     steps = np.divide(WHITE, scale, out=np.zeros(TERMS), where=scale > 0)
     levels = np.empty(coefficients.shape, np.uint8)
     for term in range(TERMS):
-        levels[..., term] = _byte(coefficients[..., term] * steps[term] + bias[term])
+        levels[..., term] = _byte(coefficients[..., term] * float(steps[term]) + float(bias[term]))
     color, chroma = (None if array is None else _byte(array * WHITE) for array in (color, chroma))
     return Ptm(levels, scale, bias, color, chroma, matrix, polynomials.curve, polynomials.parameters)
 

@@ -1,0 +1,219 @@
+"""Tables "ptm" and "ptm_fit": how true PTMs are under lights that were not fitted, and how fast they are fitted."""
+
+from __future__ import annotations
+
+import os
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from bake.direct import LightTriangulation, render_direct
+from bake.held_out import score
+from bake.photographs import Photographs, decoded, open_photographs
+from bake.ptm import fit_ptm, light_parameters
+from benchmarks.fresh_process import run_fresh
+from benchmarks.tables import Bar, Row, Table
+from benchmarks.timing import alternate
+from benchmarks.workbench import COMMAND, DATA, SAMPLES, Workbench, say
+from impostor.files.lp_file import CaptureSet, read_lp, write_lp
+from impostor.files.ptm_file import read_ptm, write_ptm
+from impostor.ptm import Polynomials, evaluate, quantise
+from impostor.ptm.normals import normals
+
+SETS = ("Object1/material1", "Object1/material4", "Object2/material2")
+GLOSSIEST = "Object2/material2"  # of the sets, the one with highlights on a diffuse body
+WIDTH, HEIGHT = 1920, 1280
+WORKERS = os.cpu_count() or 1
+
+
+def run_quality(bench: Workbench) -> Table:
+    """PSNR under held-out lights, of fits, files and the photographs themselves."""
+    columns = {
+        "psnr_db": "PSNR, dB",
+        "against_lstsq_db": "above NumPy lstsq, dB",
+        "file_loss_db": "lost by 8 bits, dB",
+        "jpeg_loss_db": "lost by JPEG_LRGB 95, dB",
+        "jpeg_smaller": "raw / JPEG_LRGB 95",
+        "prediction_saves": "saved by prediction, %",
+        "normals_deg": "normals off by, degrees",
+        "direct_db": "photographs blended, dB",
+    }
+    table = Table("ptm", "PTMs under lights that were not fitted", columns)
+    folder = DATA / "rti" / "synthrti"
+    if not folder.is_dir():
+        table.notes.append("No real capture sets here (IMPOSTOR_DATA names their folder).")
+        return table
+    for name in SETS:
+        say(f"ptm: {name}")
+        dome, test = (_capture(folder / name / part / "dirs.lp") for part in ("Dome", "Test"))
+        truth = np.asarray(Image.open(folder / name / "Dome" / "normals.png").convert("RGB"), float) / 127.5 - 1
+        plain = {kind: fit_ptm(*dome, format=kind) for kind in ("rgb", "lrgb")}
+        robust = fit_ptm(*dome, format="lrgb", robust=True)
+        lstsq = _psnr(_lstsq(*dome), test)
+        off = {"rgb": _off(plain["rgb"], truth), "robust": _off(robust, truth)}
+        values = {
+            "psnr_db": _psnr(plain["rgb"], test),
+            "against_lstsq_db": _psnr(plain["rgb"], test) - lstsq,
+            "normals_deg": off["rgb"],
+            "direct_db": _direct_psnr(dome, test),
+        }
+        table.rows.append(Row(f"{name} rgb", f"{name}, RGB", values, (Bar("against_lstsq_db", ">=", -0.005),)))
+        values = {"psnr_db": _psnr(plain["lrgb"], test), **_files(bench.folder, plain["lrgb"], test)}
+        bars = (
+            Bar("file_loss_db", "<=", 0.05),
+            Bar("jpeg_loss_db", "<=", 0.3),
+            Bar("jpeg_smaller", ">=", 4),
+            Bar("prediction_saves", ">=", 0),
+        )
+        table.rows.append(Row(f"{name} lrgb", f"{name}, LRGB", values, bars))
+        values = {"psnr_db": _psnr(robust, test), "normals_deg": off["robust"]}
+        bars = (Bar("normals_deg", "<=", 0.75 * off["rgb"]),) if name == GLOSSIEST else ()
+        table.rows.append(Row(f"{name} robust", f"{name}, LRGB, --robust", values, bars))
+    table.notes.append(
+        "Synthetic objects of 320 x 320, 49 lights to fit and 20 others to measure with; PSNR of stored (sRGB) values. "
+        "The bar of the robust fit is three quarters of the plain one's angle."
+    )
+    return table
+
+
+def run_fit(bench: Workbench) -> Table:
+    """Time and memory of fits, against decoding the same photographs."""
+    columns = {
+        "photographs": "photographs",
+        "decode_s": "decoding, s",
+        "fit_s": "fitting, s",
+        "ratio": "fitting / decoding",
+        "megapixels": "megapixels a second",
+        "peak_gb": "`impostor ptm fit`, peak GB",
+    }
+    table = Table("ptm_fit", f"Fitting photographs of {WIDTH} x {HEIGHT}", columns)
+    for label, color in (("gray objects", False), ("in colour", True)):
+        lp = _large_set(bench.folder / f"photographs_{int(color)}", 49, color)
+        photographs, parameters = _capture(lp)
+        for kind in ("lrgb", "rgb"):
+            say(f"ptm_fit: {label}, {kind}")
+            jobs = (lambda each=photographs: _decode(each), _fit_job(photographs, parameters, kind))
+            times = alternate(*jobs, repeats=5, warm_up=1)
+            cost = run_fresh(_fit_command(lp, bench.folder / "a.ptm", kind))
+            values = {
+                "photographs": 49,
+                "decode_s": times.median(0),
+                "fit_s": times.median(1),
+                "ratio": times.ratio(1, 0),
+                "megapixels": 49 * WIDTH * HEIGHT / 1e6 / times.median(1),
+                "peak_gb": None if cost.peak_bytes is None else cost.peak_bytes / 1e9,
+            }
+            bars = (Bar("ratio", "<=", 1.6), Bar("peak_gb", "<", 0.6))
+            table.rows.append(Row(f"{label} {kind}", f"{label}, {kind.upper()}", values, bars))
+    lp = _large_set(bench.folder / "photographs_many", 500, False)
+    cost = run_fresh(_fit_command(lp, bench.folder / "a.ptm", "lrgb"))
+    peak = None if cost.peak_bytes is None else cost.peak_bytes / 1e9
+    before = table.rows[0].values["peak_gb"]
+    bars = () if before is None else (Bar("peak_gb", "<=", before * 1.05),)
+    table.rows.append(Row("500", "gray objects, LRGB", {"photographs": 500, "peak_gb": peak}, bars))
+    table.notes.append(
+        f"JPEGs, sets of 320 x 320 tiled to {WIDTH} x {HEIGHT}; {WORKERS} threads for both. Decoding gives NumPy "
+        "arrays, as the fit needs them; fitting does that, too. Peak memory is the command's, in a fresh process."
+    )
+    return table
+
+
+def _capture(lp: Path) -> tuple[Photographs, NDArray[np.float64]]:
+    capture = read_lp(lp)
+    return open_photographs(capture.photographs), light_parameters(capture)
+
+
+def _psnr(polynomials: Polynomials, test: tuple[Photographs, NDArray[np.float64]]) -> float:
+    return score(lambda u, v: evaluate(polynomials, u, v), polynomials.size, *test, WORKERS).psnr_db
+
+
+def _direct_psnr(dome: tuple[Photographs, NDArray[np.float64]], test: tuple[Photographs, NDArray[np.float64]]) -> float:
+    photographs, triangulation = dome[0], LightTriangulation(dome[1])
+    return score(lambda u, v: render_direct(photographs, triangulation, u, v), photographs.size, *test, WORKERS).psnr_db
+
+
+def _lstsq(photographs: Photographs, parameters: NDArray[np.float64]) -> Polynomials:
+    u, v = parameters.T
+    matrix = np.stack([u * u, v * v, u * v, u, v, np.ones_like(u)], axis=-1)
+    pictures = np.stack([np.asarray(Image.open(path).convert("RGB")) / 255 for path in photographs.paths])
+    found = np.linalg.lstsq(matrix, pictures.reshape(len(pictures), -1), rcond=None)[0]
+    shape = (6, *pictures.shape[1:])
+    return Polynomials(np.moveaxis(found.reshape(shape), 0, -1).astype(np.float32))
+
+
+def _off(polynomials: Polynomials, truth: NDArray[np.float64]) -> float:
+    length = np.linalg.norm(truth, axis=-1)
+    known = np.abs(length - 1) < 0.1
+    cosine = np.einsum("hwc,hwc->hw", normals(polynomials), truth) / np.maximum(length, 1e-9)
+    return float(np.degrees(np.arccos(np.clip(cosine[known], -1, 1))).mean())
+
+
+def _files(folder: Path, polynomials: Polynomials, test: tuple[Photographs, NDArray[np.float64]]) -> dict[str, float]:
+    ptm, path = quantise(polynomials), folder / "a.ptm"
+    raw = write_ptm(ptm, path, force=True)
+    whole, stored = _psnr(polynomials, test), _psnr(read_ptm(path).polynomials(), test)
+    bare = write_ptm(ptm, path, compression="jpeg", quality=95, predict=False, force=True)
+    small = write_ptm(ptm, path, compression="jpeg", quality=95, force=True)
+    return {
+        "file_loss_db": whole - stored,
+        "jpeg_loss_db": stored - _psnr(read_ptm(path).polynomials(), test),
+        "jpeg_smaller": raw / small,
+        "prediction_saves": 100 * (1 - small / bare),
+    }
+
+
+def _large_set(folder: Path, count: int, color: bool) -> Path:
+    """JPEGs of WIDTH x HEIGHT: the real sets tiled, or the sample set where they are not at hand."""
+    folder.mkdir(exist_ok=True)
+    real = DATA / "rti" / "synthrti"
+    files = [real / name / "Dome" / "dirs.lp" for name in SETS] if real.is_dir() else []
+    sources = [read_lp(path) for path in files or [SAMPLES / "relief" / "rosette.lp"]]
+    tint = np.array([1.0, 0.8, 0.6]) if color else np.ones(3)
+    paths = []
+    for index in range(count):
+        tiles = [Image.open(each.photographs[index % len(each.photographs)]).convert("RGB") for each in sources]
+        picture = Image.new("RGB", (WIDTH, HEIGHT))
+        side = tiles[0].width
+        for place in range(-(-WIDTH // side) * -(-HEIGHT // side)):
+            row, column = divmod(place, -(-WIDTH // side))
+            picture.paste(tiles[place % len(tiles)], (column * side, row * side))
+        pixels = Image.fromarray(np.rint(np.asarray(picture) * tint).astype(np.uint8))
+        paths.append(folder / f"{index:03d}.jpg")
+        (pixels if color else pixels.convert("L")).save(paths[-1], quality=92)
+    directions = sources[0].directions[np.arange(count) % len(sources[0].directions)]
+    write_lp(
+        replace(cast(CaptureSet, sources[0]), photographs=tuple(paths), directions=directions), folder / "a.lp", True
+    )
+    return folder / "a.lp"
+
+
+def _decode(photographs: Photographs) -> None:
+    with ThreadPoolExecutor(WORKERS) as pool:
+        for _ in decoded(photographs, pool, 16):
+            pass
+
+
+def _fit_job(photographs: Photographs, parameters: NDArray[np.float64], kind: str):
+    return lambda: fit_ptm(photographs, parameters, format=kind, workers=WORKERS)
+
+
+def _fit_command(lp: Path, output: Path, kind: str) -> list[str]:
+    return [
+        sys.executable,
+        str(COMMAND),
+        "ptm",
+        "fit",
+        str(lp),
+        "-o",
+        str(output),
+        "--format",
+        kind,
+        "--force",
+        "--quiet",
+    ]
