@@ -185,7 +185,7 @@ def _large_set(folder: Path, count: int, color: bool) -> Path:
             picture.paste(tiles[place % len(tiles)], (column * side, row * side))
         pixels = Image.fromarray(np.rint(np.asarray(picture) * tint).astype(np.uint8))
         paths.append(folder / f"{index:03d}.jpg")
-        (pixels if color else pixels.convert("L")).save(paths[-1], quality=92)
+        pixels.save(paths[-1], quality=92)
     directions = sources[0].directions[np.arange(count) % len(sources[0].directions)]
     write_lp(
         replace(cast(CaptureSet, sources[0]), photographs=tuple(paths), directions=directions), folder / "a.lp", True

@@ -142,8 +142,11 @@ class World:
         sun, moon = np.radians([SUN_AZIMUTH_DEG, row[1]]), np.radians([MOON_AZIMUTH_DEG, MOON_ELEVATION_DEG])
         names = ("sunlight", "moonlight", "ambient", "zenith", "horizon")
         colors = {name: tuple(row[2 + 3 * i : 5 + 3 * i]) for i, name in enumerate(names)}
+        # What the sky and the ground behind the viewer throw back; from below the horizon it casts no shadow.
+        colors["backlight"] = tuple(0.9 * np.array(colors["ambient"]))
+        ways = {"sun": direction(*sun), "moon": direction(*moon), "back": direction(sun[0] + 2.3, -0.05)}
         night = float(np.interp(self.time, [0.62, 0.95], [0, 1]))
-        return {"sun": tuple(direction(*sun)), "moon": tuple(direction(*moon)), "night": night, **colors}
+        return {name: tuple(way.tolist()) for name, way in ways.items()} | colors | {"night": night}
 
 
 class Picture:
@@ -244,7 +247,7 @@ class Picture:
                 program[name].write(np.ascontiguousarray(values[name], "f4"))
 
     def _light_fans(self, sky):
-        lights = [(sky["sun"], sky["sunlight"]), (sky["moon"], sky["moonlight"])]
+        lights = [(sky[name], sky[f"{name}light"]) for name in ("sun", "moon", "back")]
         self.renderer.lights = [impostor.DirectionalLight(*light) for light in lights if max(light[1]) > 0]
         self.renderer.ambient = sky["ambient"]
 

@@ -16,7 +16,7 @@ SKY = np.array(
 )
 
 SHARED = """#version 330
-uniform vec3 sun, sunlight, moon, moonlight, ambient, zenith, horizon, eye;
+uniform vec3 sun, sunlight, moon, moonlight, back, backlight, ambient, zenith, horizon, eye;
 uniform vec3 lamps[3];
 uniform float night, time;
 float hash(vec2 p) { return fract(sin(dot(p, vec2(127.1, 311.7))) * 43758.5453); }
@@ -28,7 +28,8 @@ vec3 srgb(vec3 c) {
     return mix(c * 12.92, 1.055 * pow(clamp(c, 0.0, 1.0), vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c));
 }
 vec3 light(vec3 n, float lit) {
-    return ambient + lit * (sunlight * max(dot(n, sun), 0.0) + moonlight * max(dot(n, moon), 0.0));
+    vec3 direct = sunlight * max(dot(n, sun), 0.0) + moonlight * max(dot(n, moon), 0.0);
+    return ambient + backlight * max(dot(n, back), 0.0) + lit * direct;
 }
 vec3 lamplight(vec3 at, vec3 n) {
     vec3 sum = vec3(0.0);
