@@ -10,7 +10,21 @@ import traceback
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks import baking, coding, crowd, files, frames, lighting, loading, overhead, ptm, quality, report, surfaces
+from benchmarks import (
+    baking,
+    coding,
+    crowd,
+    files,
+    frames,
+    lighting,
+    loading,
+    overhead,
+    ptm,
+    quality,
+    report,
+    surfaces,
+    weight,
+)
 from benchmarks.tables import Table
 from benchmarks.workbench import DATA, Workbench, say
 
@@ -23,6 +37,7 @@ TABLES: dict[str, Callable[[Workbench], Table]] = {
     "colormap": lighting.run_colormap,
     "overhead": overhead.run,
     "crowd": crowd.run,
+    "weight": weight.run,
     "loading": loading.run,
     "coding": coding.run,
     "quality": quality.run,
