@@ -134,6 +134,9 @@ def lights_of_ball(paths: Sequence[str | os.PathLike[str]], circle: Circle) -> N
     width, height = photographs.size
     if not (0 <= circle.x < width and 0 <= circle.y < height):
         raise PhotographError(photographs.paths[0], f"is {width}x{height}; the ball at {circle} lies outside")
+    # The blur grows with the radius: one far larger than the picture would take hours.
+    if not SMALLEST_RADIUS <= circle.radius <= max(width, height):
+        raise SettingsError("circle", f"radius {circle.radius:g}; expected {SMALLEST_RADIUS:g} to {max(width, height)}")
     return np.array([_light(photographs, index, circle) for index in range(len(photographs))])
 
 

@@ -173,7 +173,7 @@ def decoded(
     pool : ThreadPoolExecutor
         Where they are decoded; Pillow lets other threads run meanwhile.
     batch : int
-        About how many photographs are in memory at a time; batches are of one size and keep all threads busy.
+        How many photographs are in memory at most; batches are about of one size, whatever the threads are.
 
     Yields
     ------
@@ -186,9 +186,8 @@ def decoded(
     PhotographError
         As `Photographs.decode`.
     """
-    workers = pool._max_workers
-    even = -(-len(photographs) // -(-len(photographs) // batch))
-    step = min(-(-even // workers) * workers, len(photographs))
+    # Not a multiple of the threads: sums over batches would round otherwise on a machine with more of them.
+    step = -(-len(photographs) // -(-len(photographs) // batch))
     memory = np.empty((step, photographs.size[1], photographs.size[0], photographs.channels), photographs.dtype)
     for start in range(0, len(photographs), step):
         indices = np.arange(start, min(start + step, len(photographs)))

@@ -117,6 +117,8 @@ def compare(
     from impostor.srgb import srgb_from_linear
 
     polynomials = read_ptm(ptm).polynomials()
+    if polynomials.parameters == "series":
+        raise SettingsError(ptm, "its parameters are those of an image series; expected a direction's, as the .lp has")
     photographs, parameters = _capture(test)
 
     def draw(lu: float, lv: float) -> NDArray[np.floating]:
@@ -204,6 +206,7 @@ def capture(
         typer.echo(f"{subject} -> {output} ({len(pictures)} photographs of {width}x{height})")
 
 
+@as_flags("circle")
 def lights(
     photographs: Annotated[list[Path], typer.Argument(metavar="BALL...", help="Photographs of a mirror ball.")],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.lp")],

@@ -12,7 +12,7 @@ import re
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -66,6 +66,11 @@ def quality(studio: Studio, name: str, fan: Fan, elevations_deg: Sequence[float]
     finally:
         comparison.release()
     return rows
+
+
+def read_results() -> dict[str, Any]:
+    """What was measured last."""
+    return json.loads(RESULTS.read_text())
 
 
 def measure(studio: Studio) -> dict[str, Any]:
@@ -123,6 +128,41 @@ def tables(results: Mapping[str, Any]) -> dict[str, str]:
     return made
 
 
+def words(results: Mapping[str, Any]) -> dict[str, str]:
+    """What the tables show, in sentences, by the name each has on the page."""
+
+    def psnr(key: str, name: str, value: int) -> float:
+        return next(row["psnr_db"] for row in results[key][name] if row[key] == value)
+
+    def both(gain: Callable[[str], float]) -> str:
+        return " and ".join(f"{gain(name):.1f}" for name in MODELS) + " dB"
+
+    def seen(name: str, label: str, elevation_deg: float) -> float:
+        rows = results["elevation"][name][label]["rows"]
+        return next(row["psnr_db"] for row in rows if row["elevation_deg"] == elevation_deg)
+
+    ring, few, many = "ring at 15°, 96 views", "hemisphere, 96 views", "hemisphere, 384 views"
+    views = [
+        both(lambda n, a=a, b=b: psnr("views", n, b) - psnr("views", n, a)) for a, b in ((12, 48), (48, 96), (96, 192))
+    ]
+    size = [
+        both(lambda n, a=a, b=b: psnr("size", n, b) - psnr("size", n, a))
+        for a, b in ((32, 128), (128, 256), (256, 512))
+    ]
+    lost = [both(lambda n, e=e: seen(n, ring, 15) - seen(n, ring, e)) for e in (20, 30, 45)]
+    at_home = both(lambda n: seen(n, ring, 15) - seen(n, few, 15))
+    away, dense = (both(lambda n, label=label: seen(n, label, 45) - seen(n, ring, 45)) for label in (few, many))
+    return {
+        "views in words": f"Statue and tree gain {views[0]} from 12 views to 48, {views[1]} from there to 96, and "
+        f"{views[2]} from there to 192. File and bake grow with the number.\n",
+        "size in words": f"Statue and tree gain {size[0]} from tiles of 32 to 128, {size[1]} from there to 256, "
+        f"which is the size on screen, and {size[2]} from there to 512.\n",
+        "elevation in words": f"A ring at 15° that is seen 5° higher loses {lost[0]} on statue and tree, 15° higher "
+        f"{lost[1]}, and 30° higher {lost[2]}. At its own elevation it is better than a hemisphere of as many views by "
+        f"{at_home}; at 45° the hemisphere is better by {away}, and one of four times as many views by {dense}.\n",
+    }
+
+
 def _picture(row: Mapping[str, float]) -> str:
     return f"{row['psnr_db']:.1f} dB, {row['iou']:.3f}"
 
@@ -132,8 +172,8 @@ def _both(rows: Sequence[Mapping[str, float]], key: str, unit: str) -> str:
 
 
 def with_tables(page: str, results: Mapping[str, Any]) -> str:
-    """The page's text with its tables made anew."""
-    for name, table in tables(results).items():
+    """The page's text with its tables and sentences made anew."""
+    for name, table in (tables(results) | words(results)).items():
         begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
         page = re.sub(
             f"{re.escape(begin)}.*?{re.escape(end)}", lambda _, b=begin, t=table, e=end: b + t + e, page, flags=re.S
@@ -233,7 +273,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--redraw", action="store_true", help="take the numbers from docs/choosing.json")
     if not parser.parse_args(arguments).redraw:
         RESULTS.write_text(json.dumps(measure(Studio()), indent=1) + "\n")
-    results = json.loads(RESULTS.read_text())
+    results = read_results()
     for name, picture in plots(results).items():
         picture.quantize(128).save(FOLDER / "figures" / f"{name}.png", optimize=True)
     PAGE.write_text(with_tables(PAGE.read_text(), results))

@@ -14,6 +14,7 @@ from pathlib import Path
 import moderngl
 import numpy as np
 from PIL import Image, ImageOps
+from scipy.spatial import KDTree
 from sunset_look import BODY, CORNERS, GROUND_VERTICES, LANTERN, LEG, SHADERS, SKY, TUFT
 
 import impostor
@@ -81,24 +82,20 @@ class World:
         self.time, self.score = time, 0
         self.place, self.heading, self.stride = np.array([1.2, 0.0, 15.0]), np.pi, 0.0
         self.house, self.statue = np.array([9.5, 0, -13.0]), np.array([-4.2, 0, -3.0])
-        spots = rng.uniform(-120, 120, (9000, 2))
-        from_middle, from_path = np.hypot(*spots.T), np.abs(spots[:, 0] - 3 * np.sin(0.13 * spots[:, 1]))
-        free = (
-            (from_middle > 17 + 3 * rng.random(9000))
-            & (from_path > 4.5)
-            & (np.hypot(*(spots - self.house[[0, 2]]).T) > 9)
-        )
-        spots = spots[free & (from_middle < 120)]
-        kept = []
-        for spot in spots:
-            if len(kept) < 620 and all(np.hypot(*(spot - other)) > 3.6 for other in kept):
-                kept.append(spot)
-        trunks = np.insert(np.array(kept), 1, 0.0, axis=1)
+        spots = rng.uniform(-120, 120, (2600, 2))
+        # Of two that are too near to each other the later goes.
+        spots = np.delete(spots, KDTree(spots).query_pairs(3.6, output_type="ndarray")[:, 1], axis=0)
+        clearing = np.hypot(*spots.T) < 17 + 3 * rng.random(len(spots))
+        path = np.abs(spots[:, 0] - 3 * np.sin(0.13 * spots[:, 1])) < 4.5
+        garden = np.hypot(*(spots - self.house[[0, 2]]).T) < 9
+        trunks = np.insert(spots[~(clearing | path | garden)], 1, 0.0, axis=1)
         # Leafy trees around the clearing, pines farther off.
         leafy = rng.random(len(trunks)) < np.interp(np.hypot(trunks[:, 0], trunks[:, 2]), [17, 45], [0.75, 0.12])
         self.trees, self.pines = trunks[leafy], trunks[~leafy]
-        turn, far = rng.uniform(0, 2 * np.pi, LANTERNS), np.sqrt(rng.uniform(9, 15.5**2, LANTERNS))
-        self.lanterns = np.stack([far * np.sin(turn), np.full(LANTERNS, 1.15), far * np.cos(turn)], axis=-1)
+        turn, far = rng.uniform(0, 2 * np.pi, 4 * LANTERNS), np.sqrt(rng.uniform(9, 15.5**2, 4 * LANTERNS))
+        lanterns = np.stack([far * np.sin(turn), np.full(len(far), 1.15), far * np.cos(turn)], axis=-1)
+        walled = np.hypot(*(lanterns - self.house)[:, [0, 2]].T) < 6.5
+        self.lanterns = lanterns[~walled & (np.hypot(*(lanterns - self.statue)[:, [0, 2]].T) > 2)][:LANTERNS]
         self.left = np.ones(LANTERNS, bool)
 
     @property

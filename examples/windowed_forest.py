@@ -21,6 +21,7 @@ class Forest(WindowConfig):
     window_size = (1280, 720)
     samples = 4
     aspect_ratio = None
+    fan = bake_fan(impostor.load_model(TREE), views=32, size=160)  # before there is a window and its context
 
     @classmethod
     def add_arguments(cls, parser):
@@ -29,10 +30,9 @@ class Forest(WindowConfig):
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
         rng, self.renderer = np.random.default_rng(1), ImpostorRenderer(self.ctx)
-        fan = bake_fan(impostor.load_model(TREE), views=32, size=160)
         places = rng.uniform(-210, 210, (1500, 3)) * [1, 0, 1]
         yaws = rng.integers(0, 12, 1500) * np.pi / 6  # few different ones: tiles are shared
-        self.renderer.add(fan, places, yaws, rng.uniform(0.6, 1.3, 1500))
+        self.renderer.add(self.fan, places, yaws, rng.uniform(0.6, 1.3, 1500))
 
     def on_render(self, time, frame_time):
         height = 12 + 20 * np.cos(0.4 * time)  # of the sun, in degrees

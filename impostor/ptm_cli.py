@@ -67,7 +67,7 @@ def render(
     at = _numbers("--light", light, 2)
     shine = _highlight(specular)
     polynomials = read_ptm(ptm).polynomials()
-    if polynomials.parameters == "light" and at[0] ** 2 + at[1] ** 2 > 1:
+    if polynomials.parameters != "series" and at[0] ** 2 + at[1] ** 2 > 1:
         raise SettingsError("--light", f"{light}; expected LU and LV of a unit vector, u² + v² at most 1")
     if show == "normal":
         picture = _bytes(normals(polynomials) / 2 + 0.5)
@@ -100,11 +100,11 @@ def convert(
     if kind not in (None, *FORMATS):
         raise SettingsError("--format", f"{format!r}; expected rgb, lrgb or lum")
     read = read_ptm(ptm)
+    before = ptm.stat().st_size  # now: the output may be the same file
     if kind not in (None, read.format):
         read = quantise(converted(read.polynomials(), cast(Literal["RGB", "LRGB", "LUM"], kind)))
     written = _write(read, output, jpeg, no_prediction, force)
     if not quiet:
-        before = ptm.stat().st_size
         typer.echo(f"{ptm} ({before / 1e6:.2f} MB) -> {output} ({read.format}, {written / 1e6:.2f} MB)")
 
 
@@ -161,6 +161,7 @@ def synthesise(
     """Quilt a PTM of any size that repeats without a seam."""
     from impostor.cli import as_flags, check_name
     from impostor.files.ptm_file import read_ptm
+    from impostor.files.ptm_header import LARGEST_SIDE
     from impostor.ptm.synthesis import synthesise as quilted
 
     check_name(output, ".ptm", force)
@@ -168,6 +169,8 @@ def synthesise(
         width, height = (int(part) for part in size.lower().split("x"))
     except ValueError:
         raise SettingsError("--size", f"{size!r}; expected WIDTHxHEIGHT as 512x512") from None
+    if max(width, height) > LARGEST_SIDE:
+        raise SettingsError("--size", f"{size}; expected sides up to {LARGEST_SIDE}, as a .ptm can hold")
     read = read_ptm(ptm)
     with as_flags("size", "patch", "seed"):
         made = quilted(read, (width, height), patch, seed)

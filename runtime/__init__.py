@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from impostor.lazy import lazy_names
 
 if TYPE_CHECKING:
+    from runtime.animation import AnimatedFan, AnimatedInstances
     from runtime.cameras import Camera
     from runtime.gpu import make_context
     from runtime.grounds import GroundSurface
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     from runtime.surfaces import Surface, lying_on, rectangle
 
 __all__ = [
+    "AnimatedFan",
+    "AnimatedInstances",
     "Camera",
     "GroundSurface",
     "ImpostorRenderer",
@@ -28,6 +31,8 @@ __all__ = [
 __getattr__ = lazy_names(
     __name__,
     {
+        "AnimatedFan": "animation",
+        "AnimatedInstances": "animation",
         "Camera": "cameras",
         "GroundSurface": "grounds",
         "ImpostorRenderer": "renderer",

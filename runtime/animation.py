@@ -78,9 +78,9 @@ class AnimatedFan:
         at = np.mod(np.asarray(phases, float), 1.0) * count
         last = np.minimum(at.astype(np.intp), count - 1)
         part = at - last
+        past = part - 0.5
         # One pose has nothing to fade to; without a fade, the nearer one is shown whole.
-        steepness = 1 / max(self.fade, 1e-12)
-        share = np.clip((part - 0.5) * steepness + 0.5, 0, 1) * (count > 1)
+        share = (np.clip(past / self.fade + 0.5, 0, 1) if self.fade > 0 else past >= 0) * (count > 1)
         # What the dither cannot show is not worth a quad.
         share = np.where(share < SMALLEST_SHARE, 0, np.where(share > 1 - SMALLEST_SHARE, 1, share))
         return Poses(last, (last + 1) % count, share.astype(np.float32))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 
@@ -80,7 +81,9 @@ class Bakery:
     def stop(self) -> None:
         """End what is being baked; a half-written fan vanishes."""
         if self._process is not None and self._process.poll() is None:
-            # As Ctrl-C would, so that it cleans up.
-            self._process.send_signal(subprocess.signal.SIGINT)  # type: ignore[attr-defined]
+            if sys.platform == "win32":
+                self._process.terminate()
+            else:
+                self._process.send_signal(signal.SIGINT)  # as Ctrl-C does, so that it cleans up
             self._process.wait()
         self._process, self.current = None, None

@@ -61,11 +61,13 @@ class Batch:
     def seen_by(self, viewer: Viewer) -> Quads:
         """The instances that show some of their fan in the picture."""
         quads = quads_toward(self.instances, viewer.eye, viewer)
-        return quads if self.levels is None else quads.take(self.levels.fan_share[quads.index] > 0)
+        shares = self.shares_of(quads)
+        return quads if (shares == 1).all() else quads.take(shares != 0)
 
     def shares_of(self, quads: Quads) -> NDArray[np.float32]:
-        """The part (N,) of each one's pixels that shows the fan."""
-        return np.ones(len(quads), np.float32) if self.levels is None else self.levels.fan_share[quads.index]
+        """The part (N,) of each one's pixels that shows the fan; below 0, from the other end of the dither."""
+        shares = self.instances.shares[quads.index]
+        return shares if self.levels is None else shares * self.levels.fan_share[quads.index]
 
     @cached_property
     def constants(self) -> NDArray[np.float32]:

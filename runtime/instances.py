@@ -37,6 +37,9 @@ class Instances:
     positions : ndarray, (N, 3) float64
     yaws, scales : ndarray, (N,) float64
     visible : ndarray, (N,) bool
+    shares : ndarray, (N,) float32
+        The part of each copy's pixels that is drawn, in a dither that stands still on screen; 1 at first. A share below
+        0 takes the pixels from the other end: -0.3 is just what 0.7 leaves out, for crossfades between two copies.
     view_vectors : ViewVectors
 
     Raises
@@ -60,6 +63,7 @@ class Instances:
         self._positions = np.array(numbers(fan.name, "positions", positions, (-1, 3), (3,), (0,)).reshape(-1, 3))
         count = len(self._positions)
         self._yaws, self._scales, self._visible = np.zeros(count), np.ones(count), np.ones(count, bool)
+        self._shares = np.ones(count, np.float32)
         self.yaws, self.scales = yaws, scales
         self.view_vectors = ViewVectors(fan.views)
 
@@ -98,13 +102,24 @@ class Instances:
     def visible(self, values: ArrayLike) -> None:
         self._visible[:] = numbers(self.fan.name, "visible", values, self._visible.shape, ()) != 0
 
+    @property
+    def shares(self) -> NDArray[np.float32]:
+        return self._shares
+
+    @shares.setter
+    def shares(self, values: ArrayLike) -> None:
+        shares = numbers(self.fan.name, "shares", values, self._shares.shape, ())
+        if np.any(np.abs(shares) > 1):
+            raise SettingsError(self.fan.name, f"shares reach {np.abs(shares).max():g}; expected -1 to 1")
+        self._shares[:] = shares
+
     def __len__(self) -> int:
         return len(self.positions)
 
     @property
     def key(self) -> tuple[object, ...]:
         """Equal while the copies stand as they stood."""
-        arrays = (self.positions, self.yaws, self.scales, self.visible)
+        arrays = (self.positions, self.yaws, self.scales, self.visible, self.shares)
         return (id(self.fan), self.gloss, *(array.tobytes() for array in arrays))
 
 

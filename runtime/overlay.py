@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from runtime.gl_state import set_state
+from runtime.gl_state import preserved_state, set_state
 from runtime.gpu import load_program, set_uniforms
 
 PAPER, INK = (14, 17, 22, 190), (240, 240, 236, 255)
@@ -74,7 +74,7 @@ def panel_picture(rows: Sequence[Row], font_size: int) -> NDArray[np.uint8]:
 
 
 class Overlay:
-    """Draws over whatever the bound framebuffer shows.
+    """Draws over whatever the bound framebuffer shows, and leaves the OpenGL state as it was.
 
     Parameters
     ----------
@@ -141,17 +141,18 @@ class Overlay:
 
         `depth` is a perspective camera's, whose projection is `clip_from_view`, (4, 4) float64.
         """
-        set_state()
-        depth.use(0)
-        set_uniforms(
-            self._distance_program,
-            depth=0,
-            unproject=(clip_from_view[2, 2], clip_from_view[2, 3]),
-            half_grey=half_grey,
-            screen=size,
-            rectangle=(0, 0, *size),
-        )
-        self._distance_array.render(moderngl.TRIANGLE_STRIP)
+        with preserved_state(self._ctx):
+            set_state()
+            depth.use(0)
+            set_uniforms(
+                self._distance_program,
+                depth=0,
+                unproject=(clip_from_view[2, 2], clip_from_view[2, 3]),
+                half_grey=half_grey,
+                screen=size,
+                rectangle=(0, 0, *size),
+            )
+            self._distance_array.render(moderngl.TRIANGLE_STRIP)
 
     def _rectangle(
         self,
@@ -160,10 +161,11 @@ class Overlay:
         rectangle: tuple[float, float, float, float],
         bottom_up: bool = False,
     ) -> None:
-        set_state(blend=(moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA))
-        texture.use(0)
-        set_uniforms(self._program, picture=0, bottom_up=bottom_up, screen=size, rectangle=rectangle)
-        self._array.render(moderngl.TRIANGLE_STRIP)
+        with preserved_state(self._ctx):
+            set_state(blend=(moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA))
+            texture.use(0)
+            set_uniforms(self._program, picture=0, bottom_up=bottom_up, screen=size, rectangle=rectangle)
+            self._array.render(moderngl.TRIANGLE_STRIP)
 
     def release(self) -> None:
         """Free everything."""

@@ -130,7 +130,7 @@ class Walk:
         return walker
 
     def press(self, action: str) -> None:
-        """Do what a key stands for; what is in `HELD` lasts until `let_go`."""
+        """Do what a key stands for; what is in `HELD` lasts until `let_go`, what is in `WINDOW` is for the window."""
         if action in HELD:
             self.held.add(action)
             if action in (*MOVES, *TURNS):
@@ -149,8 +149,10 @@ class Walk:
         elif action == "return":
             self.follows_path, self.walker = False, self._standing()
             self.stage.renderer.advance(np.inf)
-        elif action == "path" and not self.follow_path():
-            self.say("this scene has no camera path")
+        elif action == "path":
+            self.say("along the camera path" if self.follow_path() else "this scene has no camera path")
+        else:
+            raise ValueError(f"no action {action!r}")
 
     def let_go(self, action: str) -> None:
         """A key has been released."""
@@ -311,11 +313,11 @@ class Walk:
     def _statistics_rows(self) -> tuple[Row, ...]:
         if self._since_rows >= PATIENCE:
             self._since_rows = 0.0
-            eye = ", ".join(f"{each:.1f}" for each in np.round(self.walker.eye, 1) + 0.0)
-            spared = f"{self.triangles_not_drawn:,} triangles" if self.shown.split is None else "the left side's meshes"
+            eye = ", ".join(f"{each:.2f}" for each in np.round(self.walker.eye, 2) + 0.0)
+            spared = () if self.shown.split is not None else (f"{self.triangles_not_drawn:,} triangles",)
             self._rows = (
                 *self.statistics.rows(),
-                ("not drawn", spared),
+                *(("not drawn", each) for each in spared),
                 ("sun", self.sun.words),
                 ("eye", f"{eye} m, {'flying' if self.walker.flying else 'walking'}"),
                 ("view", self.shown.view),

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from impostor.cli import AsJson, Force, Quiet, check_name, progress_bar
+from impostor.cli import INTERRUPTED, AsJson, Force, Quiet, check_name, progress_bar
 from impostor.errors import GpuError, SettingsError
 
 if TYPE_CHECKING:
@@ -137,8 +137,9 @@ def ready_scene(scene_file: Path) -> Scene:
     bakery = Bakery(unbaked(scene))
     try:
         bakery.poll(wait=True)
-    finally:
+    except KeyboardInterrupt:
         bakery.stop()
+        sys.exit(INTERRUPTED)  # the bake has said that it was stopped
     if bakery.failed:
         raise typer.Exit(1)  # the bake itself has said why
     return scene
@@ -175,6 +176,7 @@ def _walk_in_window(
     with ExitStack() as stack:
         stack.callback(window.close)
         samples, font_size = _samples(window.ctx), round(FONT_SIZE * window.pixel_ratio)
+        window.announce(f"loading {scene_file.name} ...", font_size)
         changes = SceneChanges(SceneWatcher(scene_file))
         walk = Walk(window.ctx, scene, window.picture_size, samples, changes, font_size)
         stack.callback(walk.release)

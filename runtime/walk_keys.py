@@ -57,3 +57,5 @@ MOUSE = (
 HELP = (*((key.label, key.help) for key in KEYS.values() if key.label), *MOUSE)
 HELD = frozenset({*MOVES, *TURNS, "earlier", "later"})
 """Actions that last as long as their key is down."""
+WINDOW = frozenset({"picture", "mouse", "fullscreen", "quit"})
+"""Actions that the window sees to."""

@@ -10,8 +10,9 @@ from typing import Any
 import moderngl
 
 from impostor.errors import GpuError
+from runtime.overlay import Overlay, Panel
 from runtime.walk import Walk
-from runtime.walk_keys import KEYS
+from runtime.walk_keys import KEYS, WINDOW
 
 LONGEST_STEP = 0.1  # seconds: after a pause nobody has walked on
 GRAB = 8  # pixels on either side of the divider
@@ -79,6 +80,15 @@ class Window:
         """Pixels."""
         return self._window.buffer_size
 
+    def announce(self, text: str, font_size: int) -> None:
+        """Show a line in the empty window, while there is nothing else to see."""
+        overlay = Overlay(self.ctx)
+        self._window.use()
+        self._window.clear(0.05, 0.06, 0.08, 1.0)
+        overlay.draw_panels(self.picture_size, [Panel((text,), (0.5, 0.5))], font_size)
+        self._window.swap_buffers()
+        overlay.release()
+
     def run(self, walk: Walk, frames: int | None = None, step: float | None = None) -> None:
         """Show a walk until the window is closed.
 
@@ -96,7 +106,8 @@ class Window:
         try:
             while not (self._quits or self._window.is_closing) and (frames is None or shown < frames):
                 now = time.perf_counter()
-                walk.step(min(now - last, LONGEST_STEP) if step is None else step)
+                if shown:
+                    walk.step(min(now - last, LONGEST_STEP) if step is None else step)
                 last = now
                 walk.resize(self.picture_size)
                 walk.draw()
@@ -129,7 +140,7 @@ class Window:
             self._quits = True
         elif meant == "picture":
             self.on_picture()
-        else:
+        elif meant not in WINDOW:
             walk.press(meant)
 
     def _let_all_go(self) -> None:

@@ -34,7 +34,7 @@ def synthesise(ptm: AnyPtm, size: tuple[int, int], patch: int = 48, seed: int = 
     patch : int
         Side of a patch, about: larger than what the surface is made of, 8 or more.
     seed : int
-        The same seed gives the same texture.
+        0 or more; the same seed gives the same texture.
 
     Returns
     -------
@@ -44,7 +44,7 @@ def synthesise(ptm: AnyPtm, size: tuple[int, int], patch: int = 48, seed: int = 
     Raises
     ------
     SettingsError
-        The sizes do not go together.
+        The sizes do not go together, or the seed is negative.
 
     Notes
     -----
@@ -156,6 +156,8 @@ def quilt(
     """
     across = _places(size[0], patch, features.shape[1], "width")
     down = _places(size[1], patch, features.shape[0], "height")
+    if seed < 0:
+        raise SettingsError("seed", f"{seed}; expected 0 or more")
     random = np.random.default_rng(seed)
     search = _Search(features, (down.side, across.side))
     source = np.full((size[1], size[0]), -1, np.intp)  # A torus: what a patch has beyond one edge is at the other.

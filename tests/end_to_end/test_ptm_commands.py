@@ -8,7 +8,8 @@ import pytest
 from PIL import Image
 
 from impostor.files.lp_file import read_lp
-from impostor.files.ptm_file import read_ptm
+from impostor.files.ptm_file import read_ptm, write_ptm
+from impostor.ptm import Polynomials, quantise
 from impostor.ptm.polynomials import evaluate
 from tests.captures import LIGHTS, known_polynomials, photographed, write_capture_set, write_photographs
 from tests.data import DATA, SAMPLES, needs_data
@@ -208,6 +209,12 @@ def test_bad_capture_sets_are_one_line_and_leave_nothing(capsys, tmp_path, lp):
 def test_compare_of_another_size_is_refused(capsys, tmp_path, lp):
     assert run("ptm", "fit", ROSETTE, "-o", tmp_path / "a.ptm", "--quiet") == 0
     assert "128x128" in refused(capsys, "ptm", "compare", tmp_path / "a.ptm", lp)[1]
+
+
+def test_compare_of_a_series_with_lights_is_refused(capsys, tmp_path, lp):
+    series = tmp_path / "series.ptm"
+    write_ptm(quantise(Polynomials(known_polynomials(24, 32), parameters="series")), series)
+    assert "image series" in refused(capsys, "ptm", "compare", series, lp)[1]
 
 
 @pytest.mark.parametrize("light", ["1", "a,b", "0.1,0.2,0.3", "nan,0"])

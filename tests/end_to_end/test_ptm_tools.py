@@ -1,5 +1,7 @@
 """`impostor ptm` for someone who has a PTM: look, draw, convert, film, tile."""
 
+from dataclasses import replace
+
 import av
 import numpy as np
 import pytest
@@ -87,6 +89,19 @@ def test_a_compressed_copy_is_smaller_and_comes_back(capsys, bumps, tmp_path):
     assert json_of(capsys, "ptm", "info", bare, "--json")["planes_predicted"] == 0
 
 
+def test_a_copy_over_its_source_says_both_sizes(capsys, bumps, tmp_path):
+    before = bumps.stat().st_size
+    said = ok(capsys, "ptm", "convert", bumps, bumps, "--format", "rgb", "--force")
+    assert f"({before / 1e6:.2f} MB)" in said and f"(RGB, {bumps.stat().st_size / 1e6:.2f} MB)" in said
+    assert f"{before / 1e6:.2f}" != f"{bumps.stat().st_size / 1e6:.2f}"
+
+
+def test_a_viewers_direction_is_a_unit_vector_too(capsys, tmp_path):
+    write_ptm(quantise(replace(matt_bumps()[1], parameters="view")), tmp_path / "view.ptm")
+    code, error = failed(capsys, "ptm", "render", tmp_path / "view.ptm", "-o", tmp_path / "a.png", "--light=3,3")
+    assert code == 2 and "u² + v² at most 1" in error
+
+
 def test_a_video_shows_the_light_going_round(capsys, bumps, tmp_path):
     ok(capsys, "ptm", "relight-video", bumps, "-o", tmp_path / "a.mp4", "--seconds", 1, "--rate", 8)
     with av.open(tmp_path / "a.mp4") as video:
@@ -129,6 +144,8 @@ def test_a_synthesised_ptm_has_the_size_asked_for(capsys, bumps, tmp_path):
         (["relight-video", "{ptm}", "-o", "a.mp4", "--rate", "0"], "--rate"),
         (["synthesise", "{ptm}", "-o", "b.ptm", "--size", "big"], "--size"),
         (["synthesise", "{ptm}", "-o", "b.ptm", "--patch", "1"], "--patch"),
+        (["synthesise", "{ptm}", "-o", "b.ptm", "--seed", "-1", "--size", "64x64", "--patch", "24"], "--seed"),
+        (["synthesise", "{ptm}", "-o", "b.ptm", "--size", "65536x64"], "65535"),
     ],
 )
 def test_what_cannot_be_done_is_one_line_and_writes_nothing(capsys, bumps, tmp_path, monkeypatch, arguments, message):

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from runtime import gpu
+from runtime.overdraw import OverdrawPass
+from runtime.overlay import Overlay
 from runtime.renderer import ImpostorRenderer
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -68,7 +70,8 @@ def test_every_shader_of_the_runtime_is_compiled(ctx, monkeypatch):
         return read(name)
 
     monkeypatch.setattr(gpu, "_with_includes", read)
-    ImpostorRenderer(ctx, cache_side=256).release()
+    for part in (ImpostorRenderer(ctx, cache_side=256), Overlay(ctx), OverdrawPass(ctx)):
+        part.release()
     assert compiled == {path.name for path in gpu.SHADERS.glob("*.*")}
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from bake.chrome_ball import Circle, circle_of_mask, light_of_highlight, lights_of_ball, read_mask
 from impostor.errors import SettingsError
@@ -47,6 +48,13 @@ def test_a_mask_that_is_no_ball_is_refused(rows):
 def test_a_ball_without_a_highlight_is_refused(picture):
     with pytest.raises(SettingsError, match="highlight"):
         light_of_highlight(picture, BALL)
+
+
+@pytest.mark.parametrize("radius", [-45, 0, 2, 1e9])
+def test_a_ball_that_no_picture_can_hold_is_refused(tmp_path, radius):
+    Image.fromarray((drawn_ball((0, 0, 1)).clip(0, 1) * 255).astype(np.uint8)).save(tmp_path / "ball.png")
+    with pytest.raises(SettingsError, match="radius"):
+        lights_of_ball([tmp_path / "ball.png"], Circle(BALL.x, BALL.y, radius))
 
 
 @needs_data

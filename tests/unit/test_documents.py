@@ -11,6 +11,7 @@ import benchmarks.readme as readme_table
 from tests.data import ROOT
 
 DOCUMENTS = ["README.md", "CONVENTIONS.md", "CHANGELOG.md", "docs/method.md", "docs/embedding.md", "docs/ptm.md"]
+DOCUMENTS += ["docs/games.md", "docs/choosing.md", "docs/walk.md", "examples/README.md"]
 PACKAGES = ("impostor", "bake", "runtime")
 
 
