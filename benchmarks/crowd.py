@@ -119,7 +119,8 @@ def run(bench: Workbench) -> Table:
         plain.prepare(BILINEAR)
         still = alternate(lambda plain=plain: plain.draw(BILINEAR), crowd.still, ctx=bench.ctx)
         seen = crowd.renderer.statistics["instances"]
-        sun = alternate(crowd.still, crowd.sun, ctx=bench.ctx, repeats=25)
+        # Alone: a still frame in between would relight what the sun's frame has left.
+        sun = alternate(crowd.sun, ctx=bench.ctx, repeats=25)
         walking = alternate(crowd.walking, ctx=bench.ctx).median(0)
         with _nothing_drawn():
             crowd.target.framebuffer.use()
@@ -133,8 +134,8 @@ def run(bench: Workbench) -> Table:
             "still_ratio": still.ratio(1, 0),
             "walking_ms": walking * 1e3,
             "cpu_ms": cpu * 1e3,
-            "sun_ms": sun.median(1) * 1e3,
-            "sun_ratio": sun.ratio(1, 0),
+            "sun_ms": sun.median(0) * 1e3,
+            "sun_ratio": sun.median(0) / still.median(1),
             "shadows_ms": shadows * 1e3,
         }
         bars = {
