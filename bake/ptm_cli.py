@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import time
 from dataclasses import asdict
 from pathlib import Path
@@ -13,6 +12,7 @@ import typer
 
 from impostor.cli import AsJson, Force, Quiet, UpAxis, as_flags, check_name, progress_bar
 from impostor.errors import SettingsError
+from impostor.ptm_cli import numbers
 
 if TYPE_CHECKING:
     import numpy as np
@@ -70,7 +70,7 @@ def fit(
     if jpeg is not None and format == "lum":
         raise SettingsError("--jpeg", "given with --format lum; expected lrgb or rgb, which have a compressed kind")
 
-    files, parameters, notes = _series(images, series) if series else _lights(images)
+    files, parameters, notes = _series(images, series) if series else (*_lights(images), "")
     terms = ONE_PARAMETER if series == 1 else ALL_TERMS
     design = make_design(parameters, terms, images)
     photographs = open_photographs(files)
@@ -146,18 +146,16 @@ def direct(
 ) -> None:
     """Blend the photographs whose lights stand around a light: no fit, the most that a fit can hope for."""
     import numpy as np
-    from PIL import Image
 
     from bake.direct import LightTriangulation, render_direct
-    from impostor.files.output import atomic_output
+    from impostor.files.pictures import save_png
 
     check_name(output, ".png", force)
-    lu, lv = _two_numbers("--light", light)
+    lu, lv = numbers("--light", light, 2)
     photographs, parameters = _capture(images)
     triangulation = LightTriangulation(parameters)
     picture = render_direct(photographs, triangulation, lu, lv)
-    with atomic_output(output, force) as temporary:
-        Image.fromarray(np.rint(picture * 255).clip(0, 255).astype(np.uint8)).save(temporary, "PNG")
+    save_png(output, np.rint(picture * 255).clip(0, 255).astype(np.uint8), force=force)
     if not quiet:
         indices, weights = triangulation.weights(lu, lv)
         parts = [f"{photographs.paths[i].name} {w:.0%}" for i, w in zip(indices, weights, strict=True)]
@@ -189,7 +187,8 @@ def capture(
 
     check_name(output, ".lp", force)
     directions = parse_dome(dome)
-    highlight = (0.0, 60.0) if gloss is None else _two_numbers("--gloss", gloss)
+    strength, shininess = (0.0, 60.0) if gloss is None else numbers("--gloss", gloss, 2)
+    highlight = strength, shininess
     if jpeg is not None and not 1 <= jpeg <= 100:
         raise SettingsError("--jpeg", f"{jpeg}; expected 1 to 100")
     if subject.suffix.lower() in PICTURES:
@@ -233,7 +232,7 @@ def lights(
     named = of or photographs
     if len(named) != len(photographs):
         raise SettingsError("--of", f"{len(named)} photographs; expected {len(photographs)}, one for each of the ball")
-    ball = circle_of_mask(read_mask(mask), mask) if mask else Circle(*_numbers("--circle", circle or "", 3))
+    ball = circle_of_mask(read_mask(mask), mask) if mask else Circle(*numbers("--circle", circle or "", 3))
     directions = lights_of_ball(photographs, ball)
     write_lp(CaptureSet(tuple(named), directions), output, force)
     if not quiet:
@@ -244,16 +243,16 @@ def lights(
 def _capture(lp: Path) -> tuple[Photographs, NDArray[np.float64]]:
     from bake.photographs import open_photographs
 
-    files, parameters, _ = _lights(lp)
+    files, parameters = _lights(lp)
     return open_photographs(files), parameters
 
 
-def _lights(lp: Path) -> tuple[tuple[Path, ...], NDArray[np.float64], str]:
+def _lights(lp: Path) -> tuple[tuple[Path, ...], NDArray[np.float64]]:
     from bake.ptm import light_parameters
     from impostor.files.lp_file import read_lp
 
     capture = read_lp(lp)
-    return capture.photographs, light_parameters(capture), ""
+    return capture.photographs, light_parameters(capture)
 
 
 def _series(path: Path, count: int) -> tuple[tuple[Path, ...], NDArray[np.float64], str]:
@@ -264,18 +263,3 @@ def _series(path: Path, count: int) -> tuple[tuple[Path, ...], NDArray[np.float6
         f", {name} -1..1 is {low:g}..{high:g}" for name, (low, high) in zip("uv", series.ranges(), strict=False)
     )
     return series.photographs, series.parameters, ranges
-
-
-def _two_numbers(flag: str, text: str) -> tuple[float, float]:
-    first, second = _numbers(flag, text, 2)
-    return first, second
-
-
-def _numbers(flag: str, text: str, count: int) -> list[float]:
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) != count or not all(map(math.isfinite, numbers)):
-        raise SettingsError(flag, f"{text!r}; expected {count} numbers with commas between them")
-    return numbers

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import typer
 
+from impostor.cli import AsJson, Force, Quiet, as_flags, check_name, print_summary, progress_bar
 from impostor.errors import SettingsError
 
 if TYPE_CHECKING:
@@ -26,9 +27,6 @@ Gain = Annotated[float, typer.Option(help="Diffuse gain: how much more strongly 
 Specular = Annotated[
     str | None, typer.Option(metavar="STRENGTH,EXPONENT", help="Add highlights on the PTM's own normals.")
 ]
-Force = Annotated[bool, typer.Option("--force", help="Replace the output if it exists.")]
-Quiet = Annotated[bool, typer.Option("--quiet", help="No progress bar and no summary.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 
 def register(ptm: typer.Typer) -> None:
@@ -39,7 +37,6 @@ def register(ptm: typer.Typer) -> None:
 
 def info(ptm: PtmFile, as_json: AsJson = False) -> None:
     """Say what is in a PTM."""
-    from impostor.cli import print_summary
     from impostor.summary import ptm_summary
 
     print_summary(ptm_summary(ptm), as_json)
@@ -56,7 +53,6 @@ def render(
     quiet: Quiet = False,
 ) -> None:
     """Draw a PTM under one light."""
-    from impostor.cli import check_name
     from impostor.files.pictures import save_png
     from impostor.files.ptm_file import read_ptm
     from impostor.ptm.normals import albedo, normals
@@ -64,7 +60,7 @@ def render(
     check_name(output, ".png", force)
     if show not in OUTPUTS:
         raise SettingsError("--output", f"{show!r}; expected one of {', '.join(OUTPUTS)}")
-    at = _numbers("--light", light, 2)
+    at = numbers("--light", light, 2)
     shine = _highlight(specular)
     polynomials = read_ptm(ptm).polynomials()
     if polynomials.parameters != "series" and at[0] ** 2 + at[1] ** 2 > 1:
@@ -90,7 +86,6 @@ def convert(
     quiet: Quiet = False,
 ) -> None:
     """Write a PTM as another kind, compressed or not."""
-    from impostor.cli import check_name
     from impostor.files.ptm_file import read_ptm
     from impostor.ptm import quantise
     from impostor.ptm.convert import FORMATS, converted
@@ -122,7 +117,6 @@ def relight_video(
     """Let the light go round a PTM once, from the top to the right."""
     import numpy as np
 
-    from impostor.cli import check_name, progress_bar
     from impostor.files.ptm_file import read_ptm
     from impostor.files.video import video_output
 
@@ -159,7 +153,6 @@ def synthesise(
     quiet: Quiet = False,
 ) -> None:
     """Quilt a PTM of any size that repeats without a seam."""
-    from impostor.cli import as_flags, check_name
     from impostor.files.ptm_file import read_ptm
     from impostor.files.ptm_header import LARGEST_SIDE
     from impostor.ptm.synthesis import synthesise as quilted
@@ -231,13 +224,14 @@ def _write(ptm: Ptm, output: Path, jpeg: int | None, no_prediction: bool, force:
 def _highlight(specular: str | None) -> tuple[float, float] | None:
     if specular is None:
         return None
-    strength, exponent = _numbers("--specular", specular, 2)
+    strength, exponent = numbers("--specular", specular, 2)
     if strength < 0 or exponent < 0:
         raise SettingsError("--specular", f"{specular}; expected a strength and an exponent of 0 or more")
     return strength, exponent
 
 
-def _numbers(flag: str, text: str, count: int) -> tuple[float, ...]:
+def numbers(flag: str, text: str, count: int) -> tuple[float, ...]:
+    """So many finite numbers with commas between them, as a flag gives them."""
     try:
         values = tuple(float(part) for part in text.split(","))
     except ValueError:

@@ -41,7 +41,7 @@ _BLEND_EQUATION_RGB, _BLEND_EQUATION_ALPHA = 0x8009, 0x883D
 _POLYGON_OFFSET_FACTOR, _POLYGON_OFFSET_UNITS, _POLYGON_MODE, _FRONT_AND_BACK = 0x8038, 0x2A00, 0x0B40, 0x0408
 _CURRENT_PROGRAM, _VERTEX_ARRAY, _DRAW_FRAMEBUFFER, _READ_FRAMEBUFFER = 0x8B8D, 0x85B5, 0x8CA6, 0x8CAA
 _ACTIVE_TEXTURE, _TEXTURE0, _TEXTURE_2D, _TEXTURE_BINDING_2D, _SAMPLER_BINDING = 0x84E0, 0x84C0, 0x0DE1, 0x8069, 0x8919
-_DRAW_TARGET, _READ_TARGET = 0x8CA9, 0x8CA8
+_DRAW_TARGET, _READ_TARGET, _COLOR_ATTACHMENT0 = 0x8CA9, 0x8CA8, 0x8CE0
 _FILL, _CULL_FACE_MODE, _FRONT_FACE = 0x1B02, 0x0B45, 0x0B46
 _ARRAY_BUFFER, _ARRAY_BUFFER_BINDING, _UNPACK_BUFFER, _UNPACK_BUFFER_BINDING = 0x8892, 0x8894, 0x88EC, 0x88EF
 # How uploads read memory: row length, skipped rows and pixels, swapped bytes; the alignments follow each upload.
@@ -212,6 +212,11 @@ def set_state(
         _polygon_offset(*polygon_offset)
     if color_mask is not None:
         _call("glColorMask", *(int(on) for on in color_mask))
+
+
+def draw_into_level(texture: moderngl.Texture, level: int) -> None:
+    """Let the bound framebuffer draw into a mip level of a texture; moderngl makes framebuffers on the finest only."""
+    _call("glFramebufferTexture2D", _DRAW_TARGET, _COLOR_ATTACHMENT0, _TEXTURE_2D, texture.glo, level)
 
 
 def clear_color() -> None:

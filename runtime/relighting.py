@@ -137,6 +137,8 @@ def due_tiles(shown: Sequence[ShownTiles], lights: LightTable) -> list[NDArray[n
     """Which of each fan's tiles to relight now, (M,) bool each."""
     versions = [tiles.versions for tiles in shown]
     stale = [each != lights.version for each in versions]
+    if not any(each.any() for each in stale):
+        return stale
     texels = [tiles.texels for tiles in shown]
     if sum(int(each[which].sum()) for each, which in zip(texels, stale, strict=True)) <= TEXELS_A_FRAME:
         return stale

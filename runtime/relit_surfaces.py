@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from runtime.gl_state import _call, set_state
+from runtime.gl_state import draw_into_level, set_state
 from runtime.gpu import load_program, set_uniforms
 from runtime.relight import CORNERS
 from runtime.surface_textures import KINDS, PtmTextures
@@ -20,7 +20,6 @@ MOST_TERMS = 48  # pictures that make up a flat surface's light, as the shader's
 PATIENCE = 4
 MOST_TEXELS = 1 << 26  # of all pictures; the rest is lit pixel by pixel
 
-_FRAMEBUFFER, _COLOR_ATTACHMENT0, _TEXTURE_2D = 0x8D40, 0x8CE0, 0x0DE1
 
 Key = tuple[int, bytes]
 
@@ -42,8 +41,7 @@ class RelitPicture:
         width, height = (max(side >> level, 1) for side in self.texture.size)
         self.target.viewport = (0, 0, width, height)
         self.target.use()
-        # moderngl makes framebuffers on the finest level only.
-        _call("glFramebufferTexture2D", _FRAMEBUFFER, _COLOR_ATTACHMENT0, _TEXTURE_2D, self.texture.glo, level)
+        draw_into_level(self.texture, level)
 
     @property
     def texels(self) -> int:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impostor.errors import SettingsError
+from impostor.ptm.convert import converted
 from impostor.ptm.mipmaps import halve
 from impostor.ptm.quantise import Ptm
 from impostor.ptm.shading import AMBIENT_WEIGHTS
@@ -127,11 +128,7 @@ def _low(ptm: Ptm) -> NDArray[np.float64]:
 
 def _rgb_from_lum(ptm: Ptm) -> tuple[NDArray[np.uint16], NDArray[np.float64], NDArray[np.float64]]:
     """A LUM PTM as three polynomials: codes (H, W, 3, 6), and what code 0 and the whole span are worth."""
-    polynomials = ptm.polynomials()
-    assert polynomials.chroma is not None and polynomials.rgb_from_luma is not None
-    matrix = polynomials.rgb_from_luma
-    coefficients = polynomials.coefficients * matrix[:, :1].astype(np.float32)
-    coefficients[..., 5] += polynomials.chroma @ matrix[:, 1:3].T + matrix[:, 3]
+    coefficients = converted(ptm.polynomials(), "RGB").coefficients
     low, span = _span(coefficients)
     return _codes(coefficients, low, span), low, span
 

@@ -204,7 +204,9 @@ def test_hps_fitters_file_shows_its_photographs():
 
 @needs_data
 def test_hps_compressed_tablet_is_upright_and_lit_from_where_the_light_is():
-    ptm = read_ptm(DATA / "rti" / "tablet1.ptm").polynomials()
+    file = DATA / "rti" / "tablet1.ptm"
+    assert read_header(file)[0].format == "JPEG_LRGB"
+    ptm = read_ptm(file).polynomials()
     assert ptm.size == (512, 512) and ptm.format == "LRGB"
     from_left, from_right, from_top = (
         relight(ptm, light).mean(axis=-1) for light in ([-9, 0, 1], [9, 0, 1], [0, 9, 1])
