@@ -75,3 +75,7 @@ class SceneFileError(ImpostorError):
 
 class SceneWarning(ImpostorWarning):
     """Something in a scene that was done otherwise than its file asks for."""
+
+
+class EnvironmentFileError(ImpostorError):
+    """An environment map that cannot be read, or that is not light from all around."""

@@ -24,15 +24,18 @@ class DirectionalLight:
         From the scene toward the light, world space; made unit length.
     color : tuple of float
         Linear radiance; (1, 1, 1) shows a white surface that faces the light as white.
+    softness : float
+        Angular radius of what shines, in radians: the sun's is 0.0047. Only shadows show it.
 
     Raises
     ------
     SettingsError
-        A direction of no length, a negative or non-finite number.
+        A direction of no length, a negative or non-finite number, a softness of a quarter turn or more.
     """
 
     toward: tuple[float, float, float]
     color: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    softness: float = 0.0
 
     def __post_init__(self):
         toward, color = np.asarray(self.toward, float), np.asarray(self.color, float)
@@ -41,6 +44,8 @@ class DirectionalLight:
             raise SettingsError("light", f"direction {self.toward}; expected three finite numbers, not all zero")
         if color.shape != (3,) or not np.all(np.isfinite(color)) or np.any(color < 0):
             raise SettingsError("light", f"colour {self.color}; expected three finite numbers, none negative")
+        if not 0 <= self.softness < np.pi / 2:
+            raise SettingsError("light", f"softness {self.softness}; expected radians from 0 to below {np.pi / 2:.4f}")
         object.__setattr__(self, "toward", tuple((toward / length).tolist()))
         object.__setattr__(self, "color", tuple(color.tolist()))
 

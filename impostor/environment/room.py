@@ -1,0 +1,205 @@
+"""Room: an environment with a place and a size, so that what it mirrors lines up with its walls."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from impostor.environment.environment import Environment
+from impostor.errors import SettingsError
+from impostor.views import rotation_about_y
+
+SHAPES = ("far", "sphere", "box")
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Room:
+    """An environment with a place and a size.
+
+    Room space is the lighting space of the chapter: the walls are the unit sphere, or the cube from -1 to 1. What a
+    direction shows is the environment toward the point of the wall that it meets, as seen from `captured_at`.
+
+    Parameters
+    ----------
+    environment : Environment
+    shape : {"far", "sphere", "box"}
+        "far" is infinitely large: of `world_from_room` only the rotation counts.
+    world_from_room : ndarray, (4, 4) float64
+        Its axes are at right angles and may differ in length.
+    captured_at : tuple of float
+        Where the environment was captured, room space.
+    exposure : float
+        Multiplies the environment's light.
+    stretched : bool
+        The environment is stretched with the room, so that each face of the cube map is one wall of a box, as in the
+        chapter; else its directions are those of the world, as a camera in the room captures them.
+    outside : tuple of float
+        Linear colour of reflections at points outside the room, where there are none.
+
+    Raises
+    ------
+    SettingsError
+        A number that is not finite; a matrix without an inverse, that mirrors, or whose axes are not at right angles.
+
+    References
+    ----------
+    Bjorke, "Image-Based Lighting", GPU Gems 19, sections 19.2, 19.3 and 19.6.
+    """
+
+    environment: Environment
+    shape: str = "far"
+    world_from_room: NDArray[np.float64] | None = None
+    captured_at: Vector = (0.0, 0.0, 0.0)
+    exposure: float = 1.0
+    stretched: bool = False
+    outside: Vector = (1.0, 0.0, 0.0)
+
+    def __post_init__(self):
+        if self.shape not in SHAPES:
+            raise SettingsError("room", f"shape {self.shape!r}; expected one of {', '.join(SHAPES)}")
+        matrix = np.array(np.eye(4) if self.world_from_room is None else self.world_from_room, np.float64)
+        if matrix.shape != (4, 4) or not np.isfinite(matrix).all() or np.any(matrix[3] != (0, 0, 0, 1)):
+            raise SettingsError("room", "world_from_room is no finite affine (4, 4) matrix")
+        across = matrix[:3, :3].T @ matrix[:3, :3]
+        lengths = np.sqrt(np.diag(across))
+        if not (lengths.min() > 0 and np.linalg.det(matrix[:3, :3]) > 0):
+            raise SettingsError("room", "world_from_room mirrors or has no inverse; expected a rotation and sizes")
+        if np.abs(across / np.outer(lengths, lengths) - np.eye(3)).max() > 1e-6:
+            raise SettingsError("room", "world_from_room has axes that are not at right angles")
+        if not 0 <= self.exposure < np.inf:
+            raise SettingsError("room", f"exposure {self.exposure}; expected a number of at least 0")
+        captured = np.asarray(self.captured_at, np.float64)
+        if captured.shape != (3,) or not np.isfinite(captured).all() or not self._within(captured):
+            raise SettingsError("room", f"captured_at {self.captured_at}; expected a point inside, in room space")
+        matrix.flags.writeable = False
+        object.__setattr__(self, "world_from_room", matrix)
+        object.__setattr__(self, "captured_at", tuple(captured.tolist()))
+
+    @classmethod
+    def far(cls, environment: Environment, yaw: float = 0.0, exposure: float = 1.0) -> Room:
+        """Surroundings infinitely far away, turned about +Y by a yaw in radians."""
+        return cls(environment, "far", _placed((1, 1, 1), (0, 0, 0), yaw), exposure=exposure)
+
+    @classmethod
+    def box(
+        cls,
+        environment: Environment,
+        size: Vector,
+        position: Vector = (0.0, 0.0, 0.0),
+        yaw: float = 0.0,
+        exposure: float = 1.0,
+    ) -> Room:
+        """A box of some width, height and depth in metres around a position."""
+        return cls(environment, "box", _placed(np.divide(size, 2), position, yaw), exposure=exposure)
+
+    @classmethod
+    def sphere(
+        cls,
+        environment: Environment,
+        radius: float,
+        position: Vector = (0.0, 0.0, 0.0),
+        yaw: float = 0.0,
+        exposure: float = 1.0,
+    ) -> Room:
+        """A sphere of some radius in metres around a position."""
+        return cls(environment, "sphere", _placed((radius,) * 3, position, yaw), exposure=exposure)
+
+    @cached_property
+    def room_from_world(self) -> NDArray[np.float64]:
+        """(4, 4) float64."""
+        return np.linalg.inv(self.world_from_room)  # type: ignore[arg-type]
+
+    @cached_property
+    def environment_from_world(self) -> NDArray[np.float64]:
+        """(3, 3) float64: the rotation that turns directions of the world, normals too, into the environment's."""
+        linear = np.asarray(self.world_from_room)[:3, :3]
+        return (linear / np.linalg.norm(linear, axis=0)).T
+
+    @cached_property
+    def environment_from_room(self) -> NDArray[np.float64]:
+        """(3, 3) float64: from differences of points in room space to directions of the environment."""
+        if self.stretched:
+            return np.eye(3)
+        return np.diag(np.linalg.norm(np.asarray(self.world_from_room)[:3, :3], axis=0))
+
+    @property
+    def key(self) -> Hashable:
+        """Equal for rooms that light and mirror alike."""
+        matrix = np.asarray(self.world_from_room).tobytes()
+        return id(self.environment), self.shape, matrix, self.captured_at, self.exposure, self.stretched, self.outside
+
+    def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """Whether points of the world (..., 3) lie inside, (...) bool; all do where the room is far."""
+        linear, origin = self.room_from_world[:3, :3], self.room_from_world[:3, 3]
+        return self._within(np.asarray(points, np.float64) @ linear.T + origin)
+
+    def directions_toward(
+        self, points: ArrayLike, directions: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Where in the environment to look for what rays in the world meet.
+
+        Parameters
+        ----------
+        points, directions : array_like, (..., 3) float
+            World space; directions of any length but 0.
+
+        Returns
+        -------
+        toward : ndarray, (..., 3) float64
+            Directions in the environment, of any length but 0; finite for points outside too.
+        inside : ndarray, (...) bool
+            False where the point is outside, and the colour is `outside`.
+
+        References
+        ----------
+        GPU Gems 19, listing 19-2; the box is met by its nearest slab.
+        """
+        directions = np.asarray(directions, np.float64)
+        if self.shape == "far":
+            toward = directions @ self.environment_from_world.T
+            return toward, np.ones(toward.shape[:-1], bool)
+        linear, origin = self.room_from_world[:3, :3], self.room_from_world[:3, 3]
+        start = np.asarray(points, np.float64) @ linear.T + origin
+        along = directions @ linear.T
+        start, along = np.broadcast_arrays(start, along / np.linalg.norm(along, axis=-1, keepdims=True))
+        inside = self._within(start)
+        start = np.where(inside[..., None], start, 0)
+        reach = _to_sphere(start, along) if self.shape == "sphere" else _to_box(start, along)
+        met = start + reach[..., None] * along - self.captured_at
+        # A camera on the wall itself sees nothing of the point it touches.
+        met = np.where(np.abs(met).max(axis=-1, keepdims=True) > 1e-9, met, along)
+        return met @ self.environment_from_room.T, inside
+
+    def _within(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether points in room space lie inside, walls included."""
+        if self.shape == "far":
+            return np.ones(points.shape[:-1], bool)
+        if self.shape == "sphere":
+            return np.square(points).sum(axis=-1) <= 1
+        return np.abs(points).max(axis=-1) <= 1
+
+
+def _to_sphere(start: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distance from points inside to the unit sphere along unit vectors: the quadratic of listing 19-2."""
+    half_b = (start * along).sum(axis=-1)
+    c = np.square(start).sum(axis=-1) - 1
+    return -half_b + np.sqrt(np.maximum(half_b**2 - c, 0))
+
+
+def _to_box(start: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distance from points inside to the cube from -1 to 1 along unit vectors."""
+    parallel = np.abs(along) < 1e-12
+    reach = (np.sign(along) - start) / np.where(parallel, 1, along)
+    return np.where(parallel, np.inf, reach).min(axis=-1)
+
+
+def _placed(half_sizes: ArrayLike, position: ArrayLike, yaw: float) -> NDArray[np.float64]:
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation_about_y(yaw) * np.asarray(half_sizes, np.float64)
+    matrix[:3, 3] = position
+    return matrix
