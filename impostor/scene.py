@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from impostor.environment import Environment, Reflection, Room
 from impostor.lighting import DirectionalLight, Gloss
 from impostor.shadow_projection import Ground
 from impostor.views import rotation_about_y
 
 Vector = tuple[float, float, float]
-PARTS = ("camera", "lights", "sun", "ambient", "background", "ground", "instances", "meshes", "surfaces")
+PARTS = ("camera", "lights", "sun", "ambient", "background", "ground", "rooms", "instances", "meshes", "surfaces")
 """The fields of a scene that can change one without the other."""
 
 
@@ -69,7 +70,7 @@ class Subject:
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """All copies of one subject that shine alike: the arrays that `ImpostorRenderer.add` takes.
+    """All copies of one subject that shine and mirror alike: the arrays that `ImpostorRenderer.add` takes.
 
     Parameters
     ----------
@@ -82,6 +83,7 @@ class Placement:
     gloss : Gloss
     lod : bool
         Draw the mesh near and the fan far; the subject then has a model.
+    reflection : Reflection or None
     """
 
     subject: Subject
@@ -90,6 +92,7 @@ class Placement:
     scales: NDArray[np.float64]
     gloss: Gloss = field(default_factory=Gloss)
     lod: bool = False
+    reflection: Reflection | None = None
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -105,6 +108,7 @@ class SceneMesh:
     yaw: float = 0.0
     scale: float = 1.0
     gloss: Gloss = field(default_factory=Gloss)
+    reflection: Reflection | None = None
 
     @property
     def world_from_model(self) -> NDArray[np.float64]:
@@ -145,6 +149,44 @@ class SceneSurface:
         cos, sin = np.cos(self.pitch), np.sin(self.pitch)
         pitch = np.array([[1, 0, 0], [0, cos, sin], [0, -sin, cos]])
         return _placed(rotation_about_y(self.yaw) @ pitch, self.position)
+
+
+@dataclass(frozen=True)
+class SceneRoom:
+    """Light from all around, with a place and a size.
+
+    Parameters
+    ----------
+    environment : Path or None
+        A panorama, or a folder of six faces; None is captured in the scene itself, from the room's middle.
+    shape : {"far", "sphere", "box"}
+    size : tuple of float
+        Width, height and depth in metres; what is far has none.
+    position : tuple of float
+        Of its middle.
+    yaw : float
+        Radians.
+    turn : float
+        By how much it turns in a second, radians.
+    exposure : float
+        Multiplies its light.
+    visible : bool
+        Whether its walls are drawn, or the sky that a far one is.
+    """
+
+    environment: Path | None
+    shape: str = "far"
+    size: Vector = (1.0, 1.0, 1.0)
+    position: Vector = (0.0, 0.0, 0.0)
+    yaw: float = 0.0
+    turn: float = 0.0
+    exposure: float = 1.0
+    visible: bool = True
+
+    def around(self, environment: Environment, yaw: float) -> Room:
+        """The room with what it shows, turned by a yaw in radians."""
+        matrix = _placed(rotation_about_y(yaw) * np.divide(self.size, 2), self.position)
+        return Room(environment, self.shape, matrix, exposure=self.exposure)
 
 
 @dataclass(frozen=True)
@@ -286,6 +328,9 @@ class Scene:
     background : tuple of float or None
         None is the colour of the sky.
     ground : SceneGround or None
+    rooms : tuple of SceneRoom
+    shadow_lights : int
+        How many of the brightest lights of a room cast shadows.
     instances : tuple of Placement
         One for each subject that shines alike.
     meshes : tuple of SceneMesh
@@ -301,6 +346,8 @@ class Scene:
     ambient: Vector = (0.0, 0.0, 0.0)
     background: Vector | None = None
     ground: SceneGround | None = None
+    rooms: tuple[SceneRoom, ...] = ()
+    shadow_lights: int = 1
     instances: tuple[Placement, ...] = ()
     meshes: tuple[SceneMesh, ...] = ()
     surfaces: tuple[SceneSurface, ...] = ()

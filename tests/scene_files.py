@@ -10,7 +10,7 @@ CAMERA = "[camera]\neye = [0, 1, 5]\ntarget = [0, 1, 0]\n"
 
 def fill(folder):
     """Make files that scenes name; models, fans and PTMs are hashed, not read."""
-    for name in ("a.glb", "b.glb", "a.fan", "a.ptm", "a.png", "deep/c.obj"):
+    for name in ("a.glb", "b.glb", "a.fan", "a.ptm", "a.png", "a.hdr", "faces/px.jpg", "deep/c.obj"):
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_bytes(name.encode())
     return folder

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from impostor.errors import SceneFileError
-from impostor.files.scene_schema import REQUIRED, FileName, Key, Table, Tables, WrongValue
+from impostor.files.scene_schema import REQUIRED, FileName, Key, MapName, Table, Tables, WrongValue
 from impostor.files.toml_lines import Place, line_of, toml_spans
 
 LARGEST_FILE = 1 << 20
@@ -157,13 +157,13 @@ class Document:
             read = kind.read(value)
         except WrongValue:
             raise self.error(place, kind.expected) from None
-        return self._file(read, place) if isinstance(kind, FileName) else read
+        return self._file(read, kind, place) if isinstance(kind, FileName) else read
 
-    def _file(self, name: str, place: Place) -> Path:
+    def _file(self, name: str, kind: FileName, place: Place) -> Path:
         path = Path(os.path.realpath(self.folder / name))
         self.sought.add(path)
         try:
-            found = path.is_file()
+            found = path.is_file() or (isinstance(kind, MapName) and path.is_dir())
         except OSError:  # a name that no file can have
             found = False
         if not found:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from impostor.environment import Reflection
 from impostor.errors import SceneFileError, SceneWarning, SettingsError
 from impostor.files.baked_fans import baked_fan_path, model_files
 from impostor.files.scene_document import Document
@@ -27,6 +28,7 @@ from impostor.scene import (
     SceneCamera,
     SceneGround,
     SceneMesh,
+    SceneRoom,
     SceneSurface,
     Subject,
     Sun,
@@ -38,6 +40,7 @@ DEFAULT_LIGHT = DirectionalLight.from_angles(40, 45, (0.75, 0.75, 0.75))
 DEFAULT_AMBIENT = (0.25, 0.25, 0.25)
 AREAS = ("rectangle", "circle", "polygon")
 Table = dict[str, Any]
+Kind = tuple[Subject, Gloss, bool, Reflection | None]
 
 
 def load_scene(path: str | PathLike[str]) -> Scene:
@@ -78,13 +81,13 @@ class _Reader:
         self.document = document
         self.files: dict[Path, set[str]] = {path: set() for path in document.sought}
         self.ground: SceneGround | None = None
-        self.copies: dict[tuple[Subject, Gloss, bool], list[tuple[NDArray[np.float64], ...]]] = {}
+        self.copies: dict[Kind, list[tuple[NDArray[np.float64], ...]]] = {}
         self.asked = 0  # copies so far, with or without room
 
     def scene(self) -> Scene:
         values = self.document.read(SCENE)
         sun, lights = values["sun"], tuple(map(_light, values["light"]))
-        dark = sun is None and not lights
+        dark = sun is None and not lights and not values["room"]
         self.ground = self._ground(values["ground"])
         camera = self._camera(values["camera"])
         for index, table in enumerate(values["instance"]):
@@ -93,7 +96,8 @@ class _Reader:
             self._scatter(table, ("scatter", index))
         meshes = tuple(self._mesh(table, ("mesh", index)) for index, table in enumerate(values["mesh"]))
         surfaces = tuple(map(self._surface, values["surface"]))
-        ambient = values["ambient"] or ((0.0, 0.0, 0.0) if sun else DEFAULT_AMBIENT)
+        rooms = tuple(self._room(table, ("room", index)) for index, table in enumerate(values["room"]))
+        ambient = values["ambient"] or ((0.0, 0.0, 0.0) if sun or rooms else DEFAULT_AMBIENT)
         return Scene(
             self.document.path,
             camera,
@@ -102,6 +106,8 @@ class _Reader:
             ambient,
             values["background"],
             self.ground,
+            rooms,
+            values["shadow_lights"],
             tuple(_placement(key, parts) for key, parts in self.copies.items()),
             meshes,
             surfaces,
@@ -159,7 +165,7 @@ class _Reader:
         columns = [key["time"] for key in keys], eyes, [key["target"] for key in keys]
         return CameraPath(*map(_frozen, columns))
 
-    def _subject(self, table: Table, place: Place) -> tuple[Subject, Gloss, bool]:
+    def _subject(self, table: Table, place: Place) -> Kind:
         fan, model, lod, up = table["fan"], table["model"], table["lod"], table["up"]
         if lod and model is None:
             raise self.document.error((*place, "lod"), "a model beside it")
@@ -176,7 +182,7 @@ class _Reader:
             subject = self._baked(model, self._bake(table["bake"], up, (*place, "bake")), place)
         else:
             raise self.document.error(place, "fan or model", "no subject")
-        return subject, Gloss(table["gloss"], table["shininess"]), lod
+        return subject, Gloss(table["gloss"], table["shininess"]), lod, _reflection(table["reflection"])
 
     def _bake(self, table: Table | None, up: str, place: Place) -> BakeSettings:
         values = table or {name: key.default for name, key in BAKE.items()}
@@ -203,7 +209,7 @@ class _Reader:
         found = f"{Path(error.filename or '').name!r} cannot be read: {error.strerror}"
         return self.document.error((*place, "model"), "a model that can be", found)
 
-    def _add(self, key: tuple[Subject, Gloss, bool], *arrays: NDArray[np.float64]) -> None:
+    def _add(self, key: Kind, *arrays: NDArray[np.float64]) -> None:
         self.copies.setdefault(key, []).append(arrays)
 
     def _instance(self, table: Table, place: Place) -> None:
@@ -278,6 +284,7 @@ class _Reader:
             math.radians(table["yaw_deg"]),
             table["scale"],
             Gloss(table["gloss"], table["shininess"]),
+            _reflection(table["reflection"]),
         )
 
     def _surface(self, table: Table) -> SceneSurface:
@@ -294,6 +301,27 @@ class _Reader:
             Gloss(table["gloss"], table["shininess"]),
         )
 
+    def _room(self, table: Table, place: Place) -> SceneRoom:
+        self._note("rooms", table["environment"])
+        shape, wanted = table["shape"], {"far": None, "sphere": "radius", "box": "size"}[table["shape"]]
+        for name in ("size", "radius"):
+            if (table[name] is None) == (name == wanted):
+                expected = f"one with {shape!r}" if name == wanted else f"none with {shape!r}"
+                raise self.document.error((*place, name), expected)
+        width, height, depth = table["size"] or [2 * (table["radius"] or 1.0)] * 3
+        if shape == "far" and table["environment"] is None:
+            raise self.document.error((*place, "environment"), "one with 'far'")
+        return SceneRoom(
+            table["environment"],
+            shape,
+            (width, height, depth),
+            self._standing(table["position"], height / 2 if shape != "far" else 0.0),
+            math.radians(table["yaw_deg"]),
+            math.radians(table["turn_deg"]),
+            table["exposure"],
+            table["visible"],
+        )
+
     def _warn(self, place: Place, problem: str) -> None:
         text = f"{self.document.path}: {self.document.where(place)}: {problem}"
         warnings.warn(SceneWarning(text), stacklevel=2)
@@ -303,6 +331,10 @@ def _light(table: Table) -> DirectionalLight:
     return DirectionalLight.from_angles(table["azimuth_deg"], table["elevation_deg"], table["color"])
 
 
+def _reflection(table: Table | None) -> Reflection | None:
+    return None if table is None else Reflection(**table)
+
+
 def _sun(table: Table | None) -> Sun | None:
     if table is None:
         return None
@@ -310,10 +342,10 @@ def _sun(table: Table | None) -> Sun | None:
     return Sun(latitude=latitude, north=north, **table)
 
 
-def _placement(key: tuple[Subject, Gloss, bool], parts: list[tuple[NDArray[np.float64], ...]]) -> Placement:
-    subject, gloss, lod = key
+def _placement(key: Kind, parts: list[tuple[NDArray[np.float64], ...]]) -> Placement:
     positions, yaws, scales = (_frozen(np.concatenate(arrays)) for arrays in zip(*parts, strict=True))
-    return Placement(subject, positions, yaws, scales, gloss, lod)
+    subject, gloss, lod, reflection = key
+    return Placement(subject, positions, yaws, scales, gloss, lod, reflection)
 
 
 def _frozen(values: Any) -> NDArray[np.float64]:

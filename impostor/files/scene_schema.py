@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from impostor.environment.room import SHAPES
 from impostor.fan import MAX_SIZE, MIN_SIZE
 from impostor.srgb import linear_from_srgb
 from impostor.views import LAYOUTS, MAX_VIEWS
@@ -14,6 +15,8 @@ from impostor.views import LAYOUTS, MAX_VIEWS
 FARTHEST = 100_000.0
 MOST_COPIES = 1_000_000
 MOST_CORNERS = 1000
+MOST_ROOMS = 4
+MAP_SUFFIXES = (".hdr", ".exr")
 MODEL_SUFFIXES = (".3mf", ".dae", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
 _COUNT_WORDS = {2: "two", 3: "three", 4: "four"}
 _HEX_COLOR = re.compile(r"#[0-9A-Fa-f]{6}")
@@ -177,6 +180,18 @@ class FileName:
 
 
 @dataclass(frozen=True)
+class MapName(FileName):
+    """An environment map: a file, or a folder of six faces."""
+
+    @property
+    def expected(self) -> str:
+        return f"{super().expected}, or of a folder with six faces"
+
+    def read(self, value: Any) -> str:
+        return value if isinstance(value, str) and value and "\0" not in value else super().read(value)
+
+
+@dataclass(frozen=True)
 class Table:
     keys: Mapping[str, Key]
     expected = "a table"
@@ -212,6 +227,14 @@ _GLOSS = {
     "gloss": Key(Number(0, 100), 0.0),
     "shininess": Key(Number(0, 10_000, above=True), 32.0),
 }
+REFLECTION = {
+    "strength": Key(Number(0, 1), 1.0),
+    "least": Key(Number(0, 1), 0.05),
+    "exponent": Key(Number(0, 64), 5.0),
+    "roughness": Key(Number(0, 1), 0.0),
+    "metal": Key(Number(0, 1), 0.0),
+}
+_REFLECTION = {"reflection": Key(Table(REFLECTION))}
 _PLACE = {
     "position": Key(Standing(), [0.0, 0.0], "m"),
     "yaw_deg": Key(_TURN, 0.0, "degrees"),
@@ -230,6 +253,7 @@ _SUBJECT = {
     "bake": Key(Table(BAKE)),
     "lod": Key(Flag(), False),
     **_GLOSS,
+    **_REFLECTION,
 }
 CAMERA_PATH = {
     "time": Key(Number(0, 86_400), REQUIRED, "s"),
@@ -269,6 +293,17 @@ GROUND = {
     "tile": Key(_LENGTH, 1.0, "m"),
     "reach": Key(_LENGTH, 100.0, "m"),
 }
+ROOM = {
+    "environment": Key(MapName(MAP_SUFFIXES)),
+    "shape": Key(Choice(SHAPES), "far"),
+    "size": Key(Numbers(3, _LENGTH), None, "m"),
+    "radius": Key(_LENGTH, None, "m"),
+    "position": Key(Standing(), [0.0, 0.0], "m"),
+    "yaw_deg": Key(_TURN, 0.0, "degrees"),
+    "turn_deg": Key(_TURN, 0.0, "degrees/s"),
+    "exposure": Key(Number(0, 1000), 1.0),
+    "visible": Key(Flag(), True),
+}
 INSTANCE = {**_SUBJECT, **_PLACE, "scale": Key(_SCALE, 1.0)}
 SCATTER = {
     **_SUBJECT,
@@ -283,7 +318,8 @@ SCATTER = {
     "yaw_deg": Key(_TURN, None, "degrees"),
     "scale": Key(Range(_SCALE), [1.0, 1.0]),
 }
-MESH = {"model": Key(FileName(MODEL_SUFFIXES), REQUIRED), **_UP, **_PLACE, "scale": Key(_SCALE, 1.0), **_GLOSS}
+MESH = {"model": Key(FileName(MODEL_SUFFIXES), REQUIRED), **_UP, **_PLACE, "scale": Key(_SCALE, 1.0)}
+MESH |= _GLOSS | _REFLECTION
 SURFACE = {
     "ptm": Key(FileName((".ptm",)), REQUIRED),
     "width": Key(_LENGTH, REQUIRED, "m"),
@@ -300,6 +336,8 @@ SCENE = {
     "light": Key(Tables(LIGHT, 1000), []),
     "sun": Key(Table(SUN)),
     "ground": Key(Table(GROUND)),
+    "room": Key(Tables(ROOM, MOST_ROOMS), []),
+    "shadow_lights": Key(Whole(0, 8), 1),
     "instance": Key(Tables(INSTANCE, 10_000), []),
     "scatter": Key(Tables(SCATTER, 256), []),
     "mesh": Key(Tables(MESH, 10_000), []),

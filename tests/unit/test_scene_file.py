@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from impostor.environment import Environment, Reflection
 from impostor.errors import SceneWarning
 from impostor.files.baked_fans import baked_fan_path
 from impostor.files.scene_file import load_scene
@@ -238,6 +239,62 @@ def test_every_file_is_listed_with_the_parts_made_of_it(folder):
         folder / "a.fan": {"instances"},
         folder / "a.ptm": {"surfaces"},
     }
+
+
+def test_rooms_stand_on_the_ground_and_turn_with_time(folder):
+    text = f"""{CAMERA}
+    [ground]
+    height = 2
+    [[room]]
+    environment = "a.hdr"
+    turn_deg = 90
+    [[room]]
+    environment = "faces"
+    shape = "box"
+    size = [4, 3, 6]
+    position = [1, -1]
+    yaw_deg = 90
+    visible = false
+    [[room]]
+    shape = "sphere"
+    radius = 5
+    """
+    far, box, sphere = load(folder, text).rooms
+    assert far.environment == folder / "a.hdr" and far.turn == pytest.approx(np.pi / 2)
+    assert box.environment == folder / "faces" and not box.visible and box.position == (1, 3.5, -1)
+    grey = Environment("grey", np.ones((6, 8, 8, 3), np.float32))
+    corner = box.around(grey, box.yaw).world_from_room @ (1, 1, 1, 1)
+    np.testing.assert_allclose(corner[:3], (1 + 3, 3.5 + 1.5, -1 - 2), atol=1e-12)
+    assert sphere.environment is None and sphere.position == (0, 7, 0)
+    assert np.linalg.norm(sphere.around(grey, 0.0).world_from_room[:3, 0]) == 5
+
+
+def test_a_room_is_the_light_where_nothing_else_is_said(folder):
+    scene = load(folder, f'{CAMERA}\n[[room]]\nenvironment = "a.hdr"')
+    assert scene.lights == () and scene.ambient == (0, 0, 0) and scene.shadow_lights == 1
+    assert scene.files[folder / "a.hdr"] == {"rooms"}
+
+
+def test_what_mirrors_alike_is_one_placement(folder):
+    text = f"""{CAMERA}
+    [[instance]]
+    model = "a.glb"
+    reflection = {{ metal = 1 }}
+    [[scatter]]
+    model = "a.glb"
+    count = 5
+    circle = [0, 0, 5]
+    reflection = {{ metal = 1 }}
+    [[instance]]
+    model = "a.glb"
+    [[mesh]]
+    model = "b.glb"
+    reflection = {{}}
+    """
+    scene = load(folder, text)
+    assert [len(each) for each in scene.instances] == [6, 1]
+    assert scene.instances[0].reflection == Reflection(metal=1) and scene.instances[1].reflection is None
+    assert scene.meshes[0].reflection == Reflection()
 
 
 def test_byte_order_mark_and_windows_line_ends(folder):

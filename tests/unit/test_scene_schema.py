@@ -11,6 +11,7 @@ from tests.scene_files import load
 
 DOCUMENT = ROOT / "impostor/files/SCENE.md"
 TABLES = ["SCENE", "CAMERA", "CAMERA_PATH", "LIGHT", "SUN", "GROUND", "INSTANCE", "BAKE", "SCATTER", "MESH", "SURFACE"]
+TABLES += ["ROOM", "REFLECTION"]
 
 
 def as_toml(key):

@@ -1,0 +1,91 @@
+"""A whole environment as a few directional lights, for what knows only lights: PTMs, and callers' own shaders."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from impostor.environment.cube import face_directions, solid_angles
+from impostor.environment.room import Room
+from impostor.errors import SettingsError
+from impostor.lighting import DirectionalLight
+
+FINEST = 64  # texels along a face: finer ones are put together first
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+def light_cut(room: Room, count: int) -> list[DirectionalLight]:
+    """Lights that stand for all that a room shines with.
+
+    The sphere is halved again and again so that both halves are equally bright; every part becomes one light, which
+    stands where the part's light comes from on average.
+
+    Parameters
+    ----------
+    room : Room
+        Taken as far away.
+    count : int
+        At least 1. A room whose light comes from fewer texels gives fewer lights, a dark one none.
+
+    Returns
+    -------
+    list of DirectionalLight
+        World space, brightest first; together they hold all of the room's light.
+
+    Raises
+    ------
+    SettingsError
+        A count below 1.
+
+    References
+    ----------
+    Debevec, "A Median Cut Algorithm for Light Probe Sampling", SIGGRAPH 2005 posters.
+    """
+    if count < 1:
+        raise SettingsError("light cut", f"{count} lights; expected at least 1")
+    directions, power = _texels(room)
+    parts = [np.flatnonzero(power @ LUMINANCE > 0)]
+    while len(parts) < count:
+        brightness = [_brightness(power[part]) if len(part) > 1 else 0.0 for part in parts]
+        if max(brightness) == 0:
+            break
+        parts.extend(_halves(parts.pop(int(np.argmax(brightness))), directions, power))
+    lights = [_light(directions[part], power[part]) for part in parts if len(part)]
+    return sorted(lights, key=lambda light: -float(LUMINANCE @ light.color))
+
+
+def _texels(room: Room) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where in the world the texels are that shine, (K, 3), and with what irradiance on what faces them, (K, 3)."""
+    faces, size = room.environment.faces, room.environment.size
+    power = faces.astype(np.float64) * solid_angles(size)[..., None]
+    # What a coarse texel shines comes from where the fine ones in it are bright.
+    moments = (power @ LUMINANCE)[..., None] * face_directions(size)
+    if size > FINEST:
+        split = (6, FINEST, size // FINEST, FINEST, size // FINEST, 3)
+        power, moments = (each.reshape(split).sum(axis=(2, 4)) for each in (power, moments))
+    power, moments = power.reshape(-1, 3) * (room.exposure / np.pi), moments.reshape(-1, 3)
+    lengths = np.linalg.norm(moments, axis=-1, keepdims=True)
+    return moments / np.maximum(lengths, 1e-30) @ room.environment_from_world, power
+
+
+def _brightness(power: NDArray[np.float64]) -> float:
+    return float((power @ LUMINANCE).sum())
+
+
+def _halves(
+    part: NDArray[np.intp], directions: NDArray[np.float64], power: NDArray[np.float64]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """A part, halved by light across the axis along which it spreads furthest."""
+    weights = power[part] @ LUMINANCE
+    spread = directions[part] - np.average(directions[part], axis=0, weights=weights)
+    axis = int(np.argmax(weights @ spread**2))
+    order = part[np.argsort(directions[part, axis], kind="stable")]
+    light = np.cumsum(power[order] @ LUMINANCE)
+    middle = int(np.clip(np.searchsorted(light, light[-1] / 2) + 1, 1, len(order) - 1))
+    return order[:middle], order[middle:]
+
+
+def _light(directions: NDArray[np.float64], power: NDArray[np.float64]) -> DirectionalLight:
+    x, y, z = ((power @ LUMINANCE) @ directions).tolist()
+    red, green, blue = power.sum(axis=0).tolist()
+    return DirectionalLight((x, y, z) if (x, y, z) != (0, 0, 0) else (0.0, 1.0, 0.0), (red, green, blue))
