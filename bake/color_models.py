@@ -19,7 +19,7 @@ TINY = np.float32(1e-20)
 POWER = 4  # of the squares: a second colour half as strong as the first is left at 0.4 percent
 
 
-def luminance_and_color(planes: NDArray[np.float32], design: Design) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def luminance_and_color(planes: NDArray[np.float32], root: NDArray[np.float32]) -> NDArray[np.float32]:
     """The luminance polynomial and the constant colour that together come nearest to three polynomials.
 
     Over the photographed lights, the sum of squared differences is least: the leading singular vector of the
@@ -28,59 +28,56 @@ def luminance_and_color(planes: NDArray[np.float32], design: Design) -> tuple[ND
 
     Parameters
     ----------
-    planes : ndarray of shape (6, N, 3), float32
-        The RGB fit of N texels.
-    design : Design
+    planes : ndarray of shape (6, 3, N), float32
+        The RGB fit of N texels, contiguous.
+    root : ndarray of shape (T, 6), float32
+        As `light_root` gives it.
 
     Returns
     -------
-    luminance : ndarray of shape (6, N), float32
-    color : ndarray of shape (N, 3), float32
-        0..1.
+    ndarray of shape (6, 3, N), float32
+        `planes`, written over: luminance in [:, 0], color in [:3, 1], 0..1.
     """
-    terms = list(design.terms)
-    root = np.linalg.cholesky(_gram(design) / len(design.matrix)).T.astype(np.float32)
-    used = planes if len(terms) == TERMS else planes[terms]
-    channels = np.ascontiguousarray(used.transpose(2, 0, 1))
-    weighted = multiply(root, channels)
-    squares = _squares(weighted)
+    weighted = multiply(root, planes.reshape(TERMS, -1)).reshape(-1, *planes.shape[1:])
+    squares = np.einsum("tin,tjn->ijn", weighted, weighted)
     color = np.maximum(_leading_vector(squares), 0)  # what is below 0 there is noise
     color /= np.maximum(np.sqrt(np.einsum("cn,cn->n", color, color)), TINY)
     size = np.sqrt(np.maximum(np.einsum("cn,cn->n", color, _product(squares, color)), 0))
     scale = np.minimum(size / np.float32(TYPICAL_LUMINANCE), 1 / np.maximum(color.max(axis=0), TINY))
     scale[scale < DARKEST] = 1
-    red, green, blue = color / scale
-    luminance = np.zeros((TERMS, planes.shape[1]), np.float32)
-    luminance[terms] = channels[0] * red + channels[1] * green + channels[2] * blue
-    return luminance, (color * scale).T
+    planes[:, 0] = np.einsum("tcn,cn->tn", planes, color / scale)
+    np.multiply(color, scale, out=planes[:3, 1])
+    return planes
 
 
 def luma_and_chroma(
     planes: NDArray[np.float32], design: Design, luma_from_rgb: NDArray[np.float64]
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+) -> NDArray[np.float32]:
     """The luma polynomial and the mean chromaticity of three polynomials.
 
     Parameters
     ----------
-    planes : ndarray of shape (6, N, 3), float32
+    planes : ndarray of shape (6, 3, N), float32
     design : Design
     luma_from_rgb : ndarray of shape (3, 4), float64
         As `ycrcb` or `principal_axes` gives it.
 
     Returns
     -------
-    luma : ndarray of shape (6, N), float32
-    chroma : ndarray of shape (N, 2), float32
+    ndarray of shape (6, 3, N), float32
+        `planes`, written over: luma in [:, 0], chroma in [:2, 1].
 
     References
     ----------
     HPL-98-131, section 3.
     """
     matrix = luma_from_rgb.astype(np.float32)
-    luma = planes @ matrix[0, :3]
+    luma = np.einsum("c,tcn->tn", matrix[0, :3], planes)
     luma[5] += matrix[0, 3]
-    mean = np.tensordot(design.matrix.mean(axis=0).astype(np.float32), planes, axes=1)
-    return luma, mean @ matrix[1:, :3].T + matrix[1:, 3]
+    mean = np.einsum("t,tcn->cn", design.matrix.mean(axis=0).astype(np.float32), planes)
+    planes[:, 0] = luma
+    planes[:2, 1] = np.einsum("ic,cn->in", matrix[1:, :3], mean) + matrix[1:, 3:]
+    return planes
 
 
 def ycrcb() -> NDArray[np.float64]:
@@ -119,19 +116,37 @@ def light_spread(planes: NDArray[np.float32], design: Design) -> NDArray[np.floa
 
     Parameters
     ----------
-    planes : ndarray of shape (6, N, 3), float32
+    planes : ndarray of shape (6, 3, N), float32
     design : Design
 
     Returns
     -------
     ndarray of shape (3, 3), float64
     """
-    terms = list(design.terms)
     centred = design.matrix - design.matrix.mean(axis=0)
-    values, vectors = np.linalg.eigh((centred.T @ centred)[np.ix_(terms, terms)])
+    values, vectors = np.linalg.eigh(centred.T @ centred)
     root = (vectors * np.sqrt(values.clip(0))).T.astype(np.float32)
-    weighted = np.tensordot(root, planes[terms], axes=1).reshape(-1, 3)
-    return (weighted.T @ weighted).astype(np.float64)
+    weighted = multiply(root, planes.reshape(TERMS, -1)).reshape(planes.shape)
+    return np.einsum("tin,tjn->ij", weighted, weighted).astype(np.float64)
+
+
+def light_root(design: Design) -> NDArray[np.float32]:
+    """What turns coefficients into vectors whose squared length is a polynomial's mean square over the lights.
+
+    Parameters
+    ----------
+    design : Design
+        With T terms in use.
+
+    Returns
+    -------
+    ndarray of shape (T, 6), float32
+    """
+    terms = list(design.terms)
+    active = design.matrix[:, terms]
+    root = np.zeros((len(terms), TERMS), np.float32)
+    root[:, terms] = np.linalg.cholesky(active.T @ active / len(active)).T
+    return root
 
 
 def inverse(affine: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -140,22 +155,9 @@ def inverse(affine: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.column_stack([back, -back @ affine[:, 3]]).astype(np.float64)
 
 
-def _gram(design: Design) -> NDArray[np.float64]:
-    active = design.matrix[:, list(design.terms)]
-    return active.T @ active
-
-
-def _squares(weighted: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Products of the channels of N sets of coefficients (3, T, N): RR, GG, BB, RG, GB, BR, as (6, N)."""
-    pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)]
-    return np.stack([np.einsum("tn,tn->n", weighted[i], weighted[j]) for i, j in pairs])
-
-
 def _product(squares: NDArray[np.float32], vector: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The symmetric 3x3 matrices of `_squares` times vectors (3, N)."""
-    rr, gg, bb, rg, gb, br = squares
-    r, g, b = vector
-    return np.stack([rr * r + rg * g + br * b, rg * r + gg * g + gb * b, br * r + gb * g + bb * b])
+    """Symmetric matrices (3, 3, N) times vectors (3, N)."""
+    return np.einsum("ijn,jn->in", squares, vector)
 
 
 def _leading_vector(squares: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -163,8 +165,8 @@ def _leading_vector(squares: NDArray[np.float32]) -> NDArray[np.float32]:
 
     By the power method, from gray: a colour has no negative part, so gray is never at right angles to it.
     """
-    unit = squares / np.maximum(squares[0] + squares[1] + squares[2], TINY)
-    vector = np.ones((3, squares.shape[1]), np.float32)
-    for _ in range(POWER):
+    unit = squares / np.maximum(squares[0, 0] + squares[1, 1] + squares[2, 2], TINY)
+    vector = unit.sum(axis=1)
+    for _ in range(POWER - 1):
         vector = _product(unit, vector)
     return vector

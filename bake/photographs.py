@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from impostor.errors import PhotographError
 FORMATS = ("JPEG", "PNG", "TIFF", "TGA", "BMP", "PPM", "WEBP")
 MAX_TEXELS = 80_000_000  # a fit holds 72 bytes a texel: what a header may ask for has an end
 BAND = 64  # rows copied at a time, measured
+AHEAD = 4  # photographs of the next batch, so that no thread waits for the last one of a batch
 ORIENTATION = 0x0112  # the EXIF tag
 TURNS = {
     2: Image.Transpose.FLIP_LEFT_RIGHT,
@@ -69,6 +70,11 @@ class Photographs:
         """Values in one photograph: texels times channels."""
         return self.size[0] * self.size[1] * self.channels
 
+    def memory(self, *lead: int) -> NDArray[Any]:
+        """Room for decoded photographs: (*lead, H, W, C), where each channel is a plane."""
+        planes = np.empty((*lead, self.channels, self.size[1], self.size[0]), self.dtype)
+        return np.moveaxis(planes, -3, -1)
+
     def decode(self, index: int, out: NDArray[Any] | None = None) -> NDArray[Any]:
         """The pixels of one photograph.
 
@@ -76,7 +82,8 @@ class Photographs:
         ----------
         index : int
         out : ndarray of shape (H, W, C), uint8 or uint16, optional
-            Where to put them. Memory that is used again costs much less than new memory.
+            Where to put them. Memory that is used again costs much less than new memory; and memory that holds one
+            channel after the other, as new memory does, less than other memory.
 
         Returns
         -------
@@ -90,7 +97,7 @@ class Photographs:
         """
         path = self.paths[index]
         if out is None:
-            out = np.empty((self.size[1], self.size[0], self.channels), self.dtype)
+            out = self.memory()
         try:
             with _opened(path) as image:
                 image.load()
@@ -113,10 +120,12 @@ class Photographs:
                 deep = np.asarray(band).astype(np.int64).clip(0, 65535)[..., None]
                 out[top : top + BAND] = deep if self.dtype == np.uint16 else deep >> 8
                 continue
-            pixels = np.frombuffer((band if band.mode == wanted else band.convert(wanted)).tobytes(), np.uint8)
-            # 257 takes 255 to 65535: an 8-bit photograph among 16-bit ones.
-            scaled = pixels if self.dtype == np.uint8 else pixels.astype(np.uint16) * 257
-            out[top : top + BAND] = scaled.reshape(-1, width, self.channels)
+            band = band if band.mode == wanted else band.convert(wanted)
+            for channel, name in enumerate(wanted):
+                pixels = np.frombuffer(band.tobytes("raw", name), np.uint8).reshape(-1, width)
+                # 257 takes 255 to 65535: an 8-bit photograph among 16-bit ones.
+                scaled = pixels if self.dtype == np.uint8 else pixels.astype(np.uint16) * 257
+                out[top : top + BAND, :, channel] = scaled
 
 
 def open_photographs(paths: Sequence[str | os.PathLike[str]]) -> Photographs:
@@ -165,7 +174,7 @@ def open_photographs(paths: Sequence[str | os.PathLike[str]]) -> Photographs:
 def decoded(
     photographs: Photographs, pool: ThreadPoolExecutor, batch: int
 ) -> Iterator[tuple[NDArray[np.int64], NDArray[Any]]]:
-    """All photographs in batches, each decoded by several threads.
+    """All photographs in batches; while one is worked on, threads begin to decode the next.
 
     Parameters
     ----------
@@ -173,13 +182,14 @@ def decoded(
     pool : ThreadPoolExecutor
         Where they are decoded; Pillow lets other threads run meanwhile.
     batch : int
-        How many photographs are in memory at most; batches are about of one size, whatever the threads are.
+        How many photographs a batch has at most; `AHEAD` more are in memory. Batches are about of one size, whatever
+        the threads are.
 
     Yields
     ------
     indices : ndarray of shape (K,), int64
     pixels : ndarray of shape (K, H, W, C), uint8 or uint16
-        Written over by the next batch.
+        Each channel of each photograph is a plane in memory. Written over by the next batch.
 
     Raises
     ------
@@ -188,12 +198,31 @@ def decoded(
     """
     # Not a multiple of the threads: sums over batches would round otherwise on a machine with more of them.
     step = -(-len(photographs) // -(-len(photographs) // batch))
-    memory = np.empty((step, photographs.size[1], photographs.size[0], photographs.channels), photographs.dtype)
+    memory = photographs.memory(step + min(AHEAD, step))
+    batches: list[tuple[NDArray[np.int64], range]] = []
     for start in range(0, len(photographs), step):
-        indices = np.arange(start, min(start + step, len(photographs)))
-        for _ in pool.map(photographs.decode, indices.tolist(), memory):
-            pass
-        yield indices, memory[: len(indices)]
+        size = min(step, len(photographs) - start)
+        # In turns at the start of the memory and at its end: what one batch leaves free is the next one's.
+        first = (len(batches) % 2) * (len(memory) - size)
+        batches.append((np.arange(start, start + size), range(first, first + size)))
+    decoding: dict[int, Future[Any]] = {}
+
+    def begin(indices: NDArray[np.int64], places: range, taken: range) -> None:
+        for index, place in zip(indices.tolist(), places, strict=True):
+            if index not in decoding and place not in taken:
+                decoding[index] = pool.submit(photographs.decode, index, memory[place])
+
+    try:
+        for number, (indices, places) in enumerate(batches):
+            begin(indices, places, range(0))
+            for following in batches[number + 1 : number + 2]:
+                begin(*following, taken=places)
+            for index in indices.tolist():
+                decoding.pop(index).result()
+            yield indices, memory[places.start : places.stop]
+    finally:
+        for each in decoding.values():
+            each.cancel()
 
 
 def _header(path: Path) -> tuple[tuple[int, int], str]:

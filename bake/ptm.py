@@ -1,18 +1,17 @@
-"""Fit a PTM to the photographs of a capture set, in one pass over them and in memory that does not grow with them."""
+"""Fit a PTM to the photographs of a capture set."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bake.color_models import (
     inverse,
+    light_root,
     light_spread,
     luma_and_chroma,
     luminance_and_color,
@@ -20,20 +19,16 @@ from bake.color_models import (
     ycrcb,
 )
 from bake.design import ALL_TERMS, Design, make_design
-from bake.photographs import Photographs, decoded
+from bake.one_pass import Turn, accumulate, blocks, turn_all, value_table, worker_count
+from bake.photographs import Photographs
 from bake.robust import robust_coefficients
-from bake.small_products import multiply
 from impostor.errors import SettingsError
 from impostor.files.lp_file import CaptureSet
 from impostor.ptm.polynomials import TERMS, Curve, Parameters, Polynomials
-from impostor.srgb import linear_from_srgb
 
 FORMATS = ("lrgb", "rgb", "lum")
 SPACES = ("ycbcr", "principal")
 LOWEST = -0.02  # a light this little below the horizon is one on it, measured badly
-BATCH = 18  # photographs between two visits to the accumulators, which weigh as much as 24 of them
-BLOCK = 19200  # values of a photograph at a time: fewer lose time between calls, more fall out of the cache
-SLICES_A_WORKER = 4  # so that workers end together
 
 
 def fit_ptm(
@@ -86,11 +81,6 @@ def fit_ptm(
     PhotographError
         A photograph that cannot be decoded.
 
-    Notes
-    -----
-    The pseudo-inverse of the lights' matrix is known before the first pixel is, so each photograph adds its share to
-    the coefficients and is forgotten.
-
     References
     ----------
     HPL-98-131, section 3. HPL-2004-225, "PTM Representation".
@@ -100,13 +90,30 @@ def fit_ptm(
     if len(design.matrix) != len(photographs):
         raise SettingsError("lights", f"{len(design.matrix)} for {len(photographs)} photographs; expected one each")
     with ThreadPoolExecutor(worker_count(workers)) as pool:
-        if robust:
+
+        def fit(turn: Turn | None = None) -> NDArray[np.float32]:
+            if not robust:
+                return accumulate(photographs, design, curve, pool, progress, turn)
             lights = unit_lights(design.parameters) if meaning == "light" else None
-            table = value_table(photographs, curve)
-            planes = robust_coefficients(photographs, design, lights, table, pool, progress)
-        else:
-            planes = accumulate(photographs, design, curve, pool, progress)
-        return assemble(planes, photographs.size, design, format, space, curve, meaning, pool)
+            planes = robust_coefficients(photographs, design, lights, value_table(photographs, curve), pool, progress)
+            if turn is not None:
+                turn_all(planes, turn, pool)
+            return planes
+
+        make = partial(Polynomials, curve=curve, parameters=meaning)
+        size, gray = photographs.size, photographs.channels == 1
+        if format == "lrgb" and gray:
+            white = np.broadcast_to(np.float32(1), (size[1], size[0], 3))
+            return make(_pictures(fit(), size), color=white)
+        if format == "lrgb":
+            planes = fit(partial(luminance_and_color, root=light_root(design)))
+            return make(_pictures(planes[:, :1], size), color=_pictures(planes[:3, 1], size))
+        if format == "lum":
+            planes, axes = _luma(fit, design, space, gray, pool)
+            chroma = _pictures(planes[:2, 1], size)
+            return make(_pictures(planes[:, :1], size), chroma=chroma, rgb_from_luma=inverse(axes))
+        planes = fit()
+        return make(_pictures(np.broadcast_to(planes, (TERMS, 3, planes.shape[2])), size))
 
 
 def light_parameters(capture: CaptureSet) -> NDArray[np.float64]:
@@ -141,159 +148,23 @@ def check_choices(format: str, curve: str, space: str) -> None:
             raise SettingsError(name, f"{value!r}; expected {' or '.join(known)}")
 
 
-def worker_count(workers: int | None) -> int:
-    """Threads to use: as asked, or as many as processors this process may use."""
-    if workers is None:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if not 1 <= workers <= 256:
-        raise SettingsError("workers", f"{workers}; expected 1 to 256")
-    return workers
+def _luma(
+    fit: Callable[[Turn | None], NDArray[np.float32]], design: Design, space: str, gray: bool, pool: ThreadPoolExecutor
+) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    """As `luma_and_chroma`, of all texels; and the colour space that was taken, (3, 4)."""
+    if space == "ycbcr" and not gray:
+        return fit(partial(luma_and_chroma, design=design, luma_from_rgb=ycrcb())), ycrcb()
+    planes = fit(None)
+    if gray:
+        planes = np.repeat(planes, 3, axis=1)
+    ends = blocks(0, planes.shape[2])
+    spreads = pool.map(lambda ends: light_spread(planes[:, :, slice(*ends)], design), ends)
+    axes = ycrcb() if space == "ycbcr" else principal_axes(np.sum(list(spreads), axis=0))
+    turn_all(planes, partial(luma_and_chroma, design=design, luma_from_rgb=axes), pool)
+    return planes, axes
 
 
-def accumulate(
-    photographs: Photographs,
-    design: Design,
-    curve: Curve,
-    pool: ThreadPoolExecutor,
-    progress: Callable[[int, int], None] | None = None,
-) -> NDArray[np.float32]:
-    """Coefficients of every channel of every texel.
-
-    Parameters
-    ----------
-    photographs : Photographs
-    design : Design
-    curve : {"srgb", "linear"}
-    pool : ThreadPoolExecutor
-    progress : callable, optional
-
-    Returns
-    -------
-    ndarray of shape (6, H * W, C), float32
-        Six planes, each a picture.
-    """
-    table = value_table(photographs, curve)
-    scale = 1 if table is not None else 1 / photographs.white
-    solver = (design.solver * scale).astype(np.float32)
-    planes = np.empty((TERMS, photographs.values), np.float32)
-    bounds = slices(photographs.values, SLICES_A_WORKER * pool._max_workers)
-    done = 0
-    for indices, pixels in decoded(photographs, pool, BATCH):
-        values = pixels.reshape(len(pixels), -1)
-        weights = np.ascontiguousarray(solver[:, indices])
-        tasks = [pool.submit(_add, planes, values, weights, table, done > 0, *bound) for bound in bounds]
-        for task in tasks:
-            task.result()
-        done += len(indices)
-        if progress is not None:
-            progress(done, len(photographs))
-    return planes.reshape(TERMS, -1, photographs.channels)
-
-
-def value_table(photographs: Photographs, curve: Curve) -> NDArray[np.float32] | None:
-    """Light of every stored value, where it is not the value over white itself."""
-    if curve == "srgb":
-        return None
-    return linear_from_srgb(np.linspace(0, 1, photographs.white + 1)).astype(np.float32)
-
-
-def slices(length: int, count: int) -> list[tuple[int, int]]:
-    """Bounds that cut a length into about equal parts, each a whole number of blocks but the last."""
-    step = -(-length // (count * BLOCK)) * BLOCK
-    return [(start, min(start + step, length)) for start in range(0, length, step)]
-
-
-def _add(
-    planes: NDArray[np.float32],
-    photographs: NDArray[Any],
-    weights: NDArray[np.float32],
-    table: NDArray[np.float32] | None,
-    begun: bool,
-    start: int,
-    stop: int,
-) -> None:
-    """Add a batch's share to one slice of the coefficients; the first batch's share is what they begin with."""
-    values = np.empty((len(photographs), BLOCK), np.float32)
-    share = np.empty((TERMS, BLOCK), np.float32)
-    for low in range(start, stop, BLOCK):
-        high = min(low + BLOCK, stop)
-        width = high - low
-        if table is None:
-            np.copyto(values[:, :width], photographs[:, low:high])
-        else:
-            np.take(table, photographs[:, low:high], out=values[:, :width], mode="clip")
-        multiply(weights, values[:, :width], share[:, :width])
-        if begun:
-            planes[:, low:high] += share[:, :width]
-        else:
-            planes[:, low:high] = share[:, :width]
-
-
-def assemble(
-    planes: NDArray[np.float32],
-    size: tuple[int, int],
-    design: Design,
-    format: str,
-    space: str,
-    curve: Curve,
-    meaning: Parameters,
-    pool: ThreadPoolExecutor,
-) -> Polynomials:
-    """A PTM of the wanted format from the coefficients of every channel.
-
-    Parameters
-    ----------
-    planes : ndarray of shape (6, H * W, C), float32
-    size : tuple of int
-        Width and height.
-    design : Design
-    format, space, curve, meaning : str
-        As `fit_ptm`.
-    pool : ThreadPoolExecutor
-
-    Returns
-    -------
-    Polynomials
-    """
-    width, height = size
-    make = partial(Polynomials, curve=curve, parameters=meaning)
-    if planes.shape[2] == 1 and format == "lrgb":
-        white = np.broadcast_to(np.ones(3, np.float32), (height, width, 3))
-        return make(_coefficients(planes, size), color=white)
-    if planes.shape[2] == 1:
-        planes = np.broadcast_to(planes, (*planes.shape[:2], 3))
-    if format == "rgb":
-        return make(_coefficients(planes, size))
-    parts = slices(planes.shape[1], -(-planes.shape[1] // BLOCK))
-    one = np.empty(planes.shape[:2], np.float32)
-    if format == "lrgb":
-        color = np.empty((planes.shape[1], 3), np.float32)
-
-        def split(start: int, stop: int) -> None:
-            one[:, start:stop], color[start:stop] = luminance_and_color(planes[:, start:stop], design)
-
-        list(pool.map(lambda part: split(*part), parts))
-        return make(_coefficients(one[..., None], size), color=color.reshape(height, width, 3))
-    chroma = np.empty((planes.shape[1], 2), np.float32)
-    axes = ycrcb() if space == "ycbcr" else principal_axes(_total_spread(planes, design, parts, pool))
-
-    def turn(start: int, stop: int) -> None:
-        one[:, start:stop], chroma[start:stop] = luma_and_chroma(planes[:, start:stop], design, axes)
-
-    list(pool.map(lambda part: turn(*part), parts))
-    return make(
-        _coefficients(one[..., None], size),
-        chroma=chroma.reshape(height, width, 2),
-        rgb_from_luma=inverse(axes),
-    )
-
-
-def _total_spread(
-    planes: NDArray[np.float32], design: Design, parts: list[tuple[int, int]], pool: ThreadPoolExecutor
-) -> NDArray[np.float64]:
-    return np.sum(list(pool.map(lambda part: light_spread(planes[:, part[0] : part[1]], design), parts)), axis=0)
-
-
-def _coefficients(planes: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
-    """The planes (6, H * W, C) as `Polynomials` has them, without a copy."""
-    return np.moveaxis(planes.reshape(TERMS, size[1], size[0], -1), 0, -1)
+def _pictures(planes: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
+    """Planes (..., C, H * W) as pictures (H, W, C, ...), without a copy."""
+    planes = planes.reshape(*planes.shape[:-1], size[1], size[0])
+    return planes.transpose(planes.ndim - 2, planes.ndim - 1, *reversed(range(planes.ndim - 2)))

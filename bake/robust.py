@@ -57,7 +57,7 @@ def robust_coefficients(
 
     Returns
     -------
-    ndarray of shape (6, H * W, C), float32
+    ndarray of shape (6, C, H * W), float32
 
     Raises
     ------
@@ -75,13 +75,13 @@ def robust_coefficients(
     sample_bytes = count * channels * photographs.dtype.itemsize
     band = max(BAND_BYTES // sample_bytes, 1)
     bounds = [(start, min(start + band, texels)) for start in range(0, texels, band)]
-    planes = np.empty((TERMS, texels, channels), np.float32)
+    planes = np.empty((TERMS, channels, texels), np.float32)
     steps = count + len(bounds)
     with tempfile.TemporaryFile(prefix="impostor-") as spool:
         done = 0
         for indices, pixels in decoded(photographs, pool, BATCH):
             for index, image in zip(indices.tolist(), pixels, strict=True):
-                _write(spool, image.reshape(texels, channels), index, bounds, count)
+                _write(spool, np.ascontiguousarray(image).reshape(texels, channels), index, bounds, count)
             done += len(indices)
             if progress is not None:
                 progress(done, steps)
@@ -94,7 +94,8 @@ def robust_coefficients(
             block = max(BLOCK_VALUES // count, 16)
             for low in range(bound[0], bound[1], block):
                 high = min(low + block, bound[1])
-                planes[:, low:high] = weigher.fit(samples[:, low - bound[0] : high - bound[0]])
+                found = weigher.fit(samples[:, low - bound[0] : high - bound[0]])
+                planes[:, :, low:high] = found.swapaxes(1, 2)
 
         for finished, _ in enumerate(pool.map(work, bounds), 1):
             if progress is not None:

@@ -29,10 +29,17 @@ def multiply(left: NDArray[Any], right: NDArray[Any], out: NDArray[Any] | None =
     if out is None:
         out = np.empty((*right.shape[:-2], rows, columns), np.result_type(left, right))
     step = max(ONE_THREAD // (rows * inner), 8)
-    for start in range(0, columns, step):
-        piece = slice(start, start + step)
-        np.matmul(left, right[..., piece], out=out[..., piece])
+    whole = columns // step * step
+    if whole:
+        np.matmul(left, _pieces(right[..., :whole], step), out=_pieces(out[..., :whole], step))
+    if whole < columns:
+        np.matmul(left, right[..., whole:], out=out[..., whole:])
     return out
+
+
+def _pieces(matrix: NDArray[Any], step: int) -> NDArray[Any]:
+    """A view (..., P, M, step) of a matrix (..., M, P * step): one call multiplies all pieces, each by itself."""
+    return matrix.reshape(*matrix.shape[:-1], -1, step).swapaxes(-3, -2)
 
 
 def solve_symmetric(matrices: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:

@@ -1,4 +1,4 @@
-"""`python -m benchmarks.readme`: the tables of README.md and docs/ptm.md, from benchmarks/results/results.json."""
+"""`python -m benchmarks.readme`: the tables of README.md and of pages in docs, from benchmarks/results/results.json."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 RESULTS = Path(__file__).with_name("results") / "results.json"
 ROOT = Path(__file__).resolve().parents[1]
-README, PTM_PAGE = ROOT / "README.md", ROOT / "docs" / "ptm.md"
+README, PTM_PAGE, WALK_PAGE = ROOT / "README.md", ROOT / "docs" / "ptm.md", ROOT / "docs" / "walk.md"
 START, END = "<!-- table from benchmarks/results -->\n", "<!-- end of table -->\n"
 MACHINE = "software-gl"
 
@@ -81,16 +81,42 @@ def ptm_table(results: dict[str, Any]) -> str:
     return "\n".join(["| fitter | megapixels of PTM a second |", "|---|---:|", *lines]) + "\n"
 
 
+def walk_table(results: dict[str, Any]) -> str:
+    """The lines of the tables of a frame's parts and of what switches in a flight, as Markdown."""
+    tables = results[MACHINE]["tables"]
+    passes, flight = tables["passes"], tables["flight"]
+    scenes = {key.removesuffix("_ms"): label.removesuffix(", ms") for key, label in passes["columns"].items()}
+    scenes = {key: label for key, label in scenes.items() if not key.endswith("%")}
+    lines = [f"| part of a frame | {' | '.join(scenes.values())} |", "|---|" + "---:|" * len(scenes)]
+    for row in passes["rows"].values():
+        cells = (_share(row["values"], key) for key in scenes)
+        lines.append(f"| {row['label']} | {' | '.join(cells)} |")
+    kinds = {"pop_max": "largest pop", "pop_99": "99 %", "rise_max": "largest rise", "spike_max": "largest spike"}
+    lines += ["", f"| the flight as | {' | '.join(kinds.values())} |", "|---|" + "---:|" * len(kinds)]
+    for row in flight["rows"].values():
+        cells = (f"{row['values'][key]:.1f}" for key in kinds)
+        lines.append(f"| {row['label']} | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _share(values: dict[str, float], scene: str) -> str:
+    milliseconds, share = values[f"{scene}_ms"], values[f"{scene}_%"]
+    return f"{milliseconds:,.0f}" if share is None else f"{milliseconds:,.1f} ms, {share:.0f} %"
+
+
 def with_table(page: str, made: str) -> str:
     """A page's text with its table made anew."""
     before, rest = page.split(START)
     return before + START + made + END + rest.split(END)[1]
 
 
+PAGES = ((README, table), (PTM_PAGE, ptm_table), (WALK_PAGE, walk_table))
+
+
 def main() -> None:
-    """Write both pages."""
+    """Write all pages."""
     results = json.loads(RESULTS.read_text())
-    for page, make in ((README, table), (PTM_PAGE, ptm_table)):
+    for page, make in PAGES:
         page.write_text(with_table(page.read_text(), make(results)))
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import moderngl
+from PIL import Image
 
 from benchmarks.chart import line_chart
 from benchmarks.fresh_process import ROOT
@@ -80,10 +81,13 @@ def write(folder: Path, found: dict[str, Any], tables: list[Table]) -> Path:
         temporary.write_text(json.dumps(results, indent=1, sort_keys=True) + "\n")
     frames = here["tables"].get("frames")
     if frames:
-        _chart(folder / f"{kind}-frames.png", frames)
+        _save(folder / f"{kind}-frames.png", _chart(frames))
+    for table in tables:
+        if table.chart is not None:
+            _save(folder / f"{kind}-{table.name}.png", table.chart)
     page = folder / f"{kind}.md"
     with atomic_output(page, force=True) as temporary:
-        temporary.write_text(_page(kind, here))
+        temporary.write_text(_page(folder, kind, here))
     return page
 
 
@@ -94,14 +98,18 @@ def _version(name: str) -> str:
         return "(not installed)"
 
 
-def _chart(path: Path, frames: dict[str, Any]) -> None:
+def _save(path: Path, chart: Image.Image) -> None:
+    with atomic_output(path, force=True) as temporary:
+        chart.save(temporary, format="PNG")
+
+
+def _chart(frames: dict[str, Any]) -> Image.Image:
     rows = sorted((row["values"] for row in frames["rows"].values()), key=lambda values: values["objects"])
     series = {label: [(row["objects"], row[key]) for row in rows] for key, label in SERIES.items()}
-    with atomic_output(path, force=True) as temporary:
-        line_chart(series, "objects", "ms a frame", frames["title"]).save(temporary, format="PNG")
+    return line_chart(series, "objects", "ms a frame", frames["title"])
 
 
-def _page(kind: str, here: dict[str, Any]) -> str:
+def _page(folder: Path, kind: str, here: dict[str, Any]) -> str:
     found, tables = here["machine"], here["tables"]
     packages = ", ".join(f"{name} {number}" for name, number in found["packages"].items())
     lines = [
@@ -115,8 +123,8 @@ def _page(kind: str, here: dict[str, Any]) -> str:
     for name, table in tables.items():
         lines += ["", f"## {table['title']}", "", *_markdown(table)]
         lines += ["", *(f"{note}" for note in table["notes"]), f"Commit {table['commit']}."]
-        if name == "frames":
-            lines += ["", f"![{table['title']}]({kind}-frames.png)"]
+        if (folder / f"{kind}-{name}.png").exists():
+            lines += ["", f"![{table['title']}]({kind}-{name}.png)"]
     return "\n".join(lines) + "\n"
 
 

@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from PIL import Image
+
 RELATIONS: dict[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
     "<=": operator.le,
@@ -82,6 +84,8 @@ class Table:
     rows : list of Row
     notes : list of str
         Sentences below the table.
+    chart : PIL.Image.Image, optional
+        Goes with the table.
     """
 
     name: str
@@ -89,6 +93,7 @@ class Table:
     columns: dict[str, str]
     rows: list[Row] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    chart: Image.Image | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The table by keys."""

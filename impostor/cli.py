@@ -97,6 +97,7 @@ def make_app() -> typer.Typer:
     app.command("info")(info)
     app.command("validate")(validate)
     app.add_typer(_ptm_app())
+    app.add_typer(_environment_app())
     return app
 
 
@@ -108,6 +109,14 @@ def _ptm_app() -> typer.Typer:
         stage.load()(ptm)
     ptm_cli.register(ptm)
     return ptm
+
+
+def _environment_app() -> typer.Typer:
+    from impostor import environment_cli
+
+    environment = typer.Typer(name="environment", help="Environment maps: describe and convert them.")
+    environment_cli.register(environment)
+    return environment
 
 
 def info(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from impostor.environment import Environment
 from impostor.errors import SceneFileError
 from impostor.fan import Fan
 from impostor.files.fan_file import read_fan
@@ -38,6 +39,12 @@ class Assets:
     def ptm(self, path: Path) -> Ptm:
         """The PTM in a file."""
         return self._get(path, read_ptm)
+
+    def environment(self, path: Path) -> Environment:
+        """The environment in a file, or in a folder of six faces."""
+        from impostor.files.environment_file import read_environment
+
+        return self._get(path, read_environment)
 
     def picture(self, path: Path) -> NDArray[np.uint8]:
         """The picture in a file, (H, W, 4) uint8, sRGB."""

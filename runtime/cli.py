@@ -139,7 +139,7 @@ def compare(
     from impostor.model import load_model
     from runtime.compare import Comparison, side_by_side
     from runtime.compare import as_json as rows_as_json
-    from runtime.renderer import DEFAULT_LIGHTS
+    from runtime.light_settings import DEFAULT_LIGHTS
 
     _check_method(method)
     angles = _numbers("--offsets", offsets)

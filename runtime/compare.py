@@ -17,8 +17,9 @@ from impostor.lighting import DirectionalLight
 from impostor.model import Model
 from impostor.views import direction
 from runtime.cameras import FRAME_MARGIN, Camera
+from runtime.light_settings import DEFAULT_AMBIENT, DEFAULT_LIGHTS
 from runtime.offscreen import Offscreen
-from runtime.renderer import DEFAULT_AMBIENT, DEFAULT_LIGHTS, ImpostorRenderer
+from runtime.renderer import ImpostorRenderer
 
 BACKGROUND = (0.4, 0.5, 0.6, 1.0)
 MESH_SAMPLES = 4

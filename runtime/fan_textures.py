@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from impostor.environment.colormap import surface_points
 from impostor.fan import Fan
 from impostor.files.fan_manifest import atlas_grid
 from impostor.srgb import linear_from_srgb, srgb_from_linear
@@ -33,7 +36,7 @@ class FanTextures:
     """
 
     def __init__(self, ctx: moderngl.Context, fan: Fan):
-        self.fan = fan
+        self._ctx, self.fan = ctx, fan
         self.size = fan.size
         # OpenGL rounds a level's size down, which tears tiles apart whose size is odd.
         self.levels = 1
@@ -66,6 +69,14 @@ class FanTextures:
         """Whether the colormap holds finished colours (the paper's uniform-albedo path)."""
         return self.color is None
 
+    @cached_property
+    def points(self) -> moderngl.Texture:
+        """Of a fan that mirrors its surroundings: `surface_points`, a row for each view."""
+        texels = np.pad(surface_points(self.fan), ((0, 0), (0, 0), (0, 1)))
+        texture = self._ctx.texture(texels.shape[1::-1], 4, texels.tobytes(), dtype="f4")
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        return texture
+
     def tile_origins(self, views: NDArray[np.integer], levels: NDArray[np.integer]) -> NDArray[np.int64]:
         """First texel (N, 2) of each view's tile in the atlas at its mip level."""
         grid = np.stack([views % self.columns, views // self.columns], axis=-1)
@@ -73,7 +84,7 @@ class FanTextures:
 
     def release(self) -> None:
         """Free the textures."""
-        for texture in (self.normal, self.depth, self.color):
+        for texture in (self.normal, self.depth, self.color, self.__dict__.pop("points", None)):
             if texture is not None:
                 texture.release()
 

@@ -43,6 +43,7 @@ _CURRENT_PROGRAM, _VERTEX_ARRAY, _DRAW_FRAMEBUFFER, _READ_FRAMEBUFFER = 0x8B8D, 
 _ACTIVE_TEXTURE, _TEXTURE0, _TEXTURE_2D, _TEXTURE_BINDING_2D, _SAMPLER_BINDING = 0x84E0, 0x84C0, 0x0DE1, 0x8069, 0x8919
 _DRAW_TARGET, _READ_TARGET, _COLOR_ATTACHMENT0 = 0x8CA9, 0x8CA8, 0x8CE0
 _FILL, _CULL_FACE_MODE, _FRONT_FACE = 0x1B02, 0x0B45, 0x0B46
+_LOGIC_OP_MODE, _OR = 0x0BF0, 0x1507
 _ARRAY_BUFFER, _ARRAY_BUFFER_BINDING, _UNPACK_BUFFER, _UNPACK_BUFFER_BINDING = 0x8892, 0x8894, 0x88EC, 0x88EF
 # How uploads read memory: row length, skipped rows and pixels, swapped bytes; the alignments follow each upload.
 _PIXEL_STORE = {0x0CF2: 0, 0x0CF3: 0, 0x0CF4: 0, 0x0CF0: 0, 0x0CF5: 4, 0x0D05: 4}
@@ -126,6 +127,7 @@ class CallerState:
         self._cull_mode, self._front_face = _integers(_CULL_FACE_MODE)[0], _integers(_FRONT_FACE)[0]
         self._polygon_offset = [_float(_POLYGON_OFFSET_FACTOR), _float(_POLYGON_OFFSET_UNITS)]
         self._polygon_mode = _integers(_POLYGON_MODE, 2)[0]
+        self._logic_op = _integers(_LOGIC_OP_MODE)[0]
         self._program, self._vertex_array = _integers(_CURRENT_PROGRAM)[0], _integers(_VERTEX_ARRAY)[0]
         self._draw, self._read = _integers(_DRAW_FRAMEBUFFER)[0], _integers(_READ_FRAMEBUFFER)[0]
         self._array_buffer, self._unpack_buffer = (
@@ -168,6 +170,7 @@ class CallerState:
         _call("glFrontFace", self._front_face)
         _polygon_offset(*self._polygon_offset)
         _call("glPolygonMode", _FRONT_AND_BACK, self._polygon_mode)
+        _call("glLogicOp", self._logic_op)
         for unit, (texture, sampler) in self._textures.items():
             _call("glActiveTexture", _TEXTURE0 + unit)
             _call("glBindTexture", _TEXTURE_2D, texture)
@@ -189,15 +192,23 @@ def set_state(
     cull_back: bool = False,
     polygon_offset: tuple[float, float] | None = None,
     color_mask: tuple[bool, bool, bool, bool] | None = None,
+    merge_bits: bool = False,
+    background: bool = False,
 ) -> None:
-    """Set every switch that a pass relies on; what is not named is off. Depth compares with LESS."""
+    """Set every switch that a pass relies on; what is not named is off. Depth compares with LESS.
+
+    `background` draws what lies before the near plane or behind the far one, too, and where depth is equal.
+    `merge_bits` adds the bits of whole numbers that are drawn to those that are there.
+    """
     for name in (_STENCIL_TEST, _FRAMEBUFFER_SRGB, _RASTERIZER_DISCARD, _SAMPLE_ALPHA_TO_COVERAGE):
         _switch(name, False)
-    for name in (_COLOR_LOGIC_OP, _DEPTH_CLAMP):
-        _switch(name, False)
+    _switch(_DEPTH_CLAMP, background)
+    _switch(_COLOR_LOGIC_OP, merge_bits)
+    if merge_bits:
+        _call("glLogicOp", _OR)
     _call("glPolygonMode", _FRONT_AND_BACK, _FILL)
     _switch(_DEPTH_TEST, depth_test)
-    _call("glDepthFunc", 0x0201)
+    _call("glDepthFunc", 0x0203 if background else 0x0201)
     _call("glDepthMask", int(depth_write))
     _switch(_BLEND, blend is not None)
     if blend is not None:
@@ -222,6 +233,11 @@ def draw_into_level(texture: moderngl.Texture, level: int) -> None:
 def clear_color() -> None:
     """Make the bound framebuffer zero, without the caller's clear values."""
     _function("glClearBufferfv")(ctypes.c_uint(0x1800), 0, (ctypes.c_float * 4)())
+
+
+def clear_bits() -> None:
+    """As `clear_color`, of whole numbers."""
+    _function("glClearBufferuiv")(ctypes.c_uint(0x1800), 0, (ctypes.c_uint * 4)())
 
 
 @contextmanager

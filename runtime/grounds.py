@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impostor.shadow_projection import Ground
+from runtime.environments import RoomTable
 from runtime.gl_state import CallerState, set_state
 from runtime.gpu import SRGB8_ALPHA8, check_texture_size, load_program, set_uniforms
+from runtime.ground_light import room_diffuse
 from runtime.instances import Viewer
 from runtime.lights import LightTable
 
@@ -42,6 +44,11 @@ class GroundSurface:
     reach: float = 100.0
     background: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
+    @property
+    def fade(self) -> tuple[float, float]:
+        """Metres from the middle where it starts to fade and where nothing is left."""
+        return self.reach / 2, self.reach
+
 
 class GroundPass:
     """Draws a ground plane in the caller's framebuffer.
@@ -53,37 +60,47 @@ class GroundPass:
 
     def __init__(self, ctx: moderngl.Context):
         self._ctx = ctx
-        self._program = load_program(ctx, "ground.vert", "ground.frag")
         self._corners = ctx.buffer(reserve=4 * 5 * 4, dynamic=True)
-        self._array = ctx.vertex_array(self._program, [(self._corners, "3f 2f", "corner", "metres")])
+        self._programs = [load_program(ctx, "ground.vert", name) for name in ("ground.frag", "ground_rooms.frag")]
+        layout = [(self._corners, "3f 2f", "corner", "metres")]
+        self._alike, self._in_rooms = (ctx.vertex_array(program, layout) for program in self._programs)
         self._white = ctx.texture((1, 1), 4, b"\xff\xff\xff\xff")
         self._textures: dict[int, tuple[NDArray[np.uint8], moderngl.Texture]] = {}
 
     def draw(
-        self, state: CallerState, viewer: Viewer, lights: LightTable, ground: Ground, surface: GroundSurface
+        self,
+        state: CallerState,
+        viewer: Viewer,
+        lights: LightTable,
+        rooms: RoomTable,
+        ground: Ground,
+        surface: GroundSurface,
     ) -> None:
-        """Draw the plane, depth-tested, from either side."""
-        axis = np.eye(3)[2] if abs(ground.normal[2]) < 0.9 else np.eye(3)[0]
-        right = np.cross(ground.normal, axis)
-        axes = np.stack([right / np.linalg.norm(right), np.cross(ground.normal, right / np.linalg.norm(right))])
-        middle = np.array(surface.middle) - (ground.normal @ surface.middle - ground.offset) * ground.normal
+        """Draw the plane, depth-tested, from either side; among several rooms each pixel in its own light."""
+        axes, middle = _axes(ground), _middle(ground, surface)
         metres = surface.reach * np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]], float)
         self._corners.write(np.hstack([metres @ axes + middle, metres]).astype("f4").tobytes())
         state.bind_target()
         set_state(depth_test=True, depth_write=True, blend=(moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA))
         self._texture(surface).use(0)
-        lights.bind(self._program, unit=1)
+        array = self._alike if len(lights.rooms) < 2 else self._in_rooms
+        if array is self._alike:
+            light = room_diffuse(lights.rooms[0], ground.normal) if lights.rooms else np.zeros(3)
+            set_uniforms(array.program, light_of_room=light)
+        else:
+            rooms.bind(array.program, unit=2)
+        lights.bind(array.program, unit=1)
         set_uniforms(
-            self._program,
+            array.program,
             clip_from_world=viewer.clip_from_world,
             base_texture=0,
             normal=tuple(ground.normal),
             albedo=surface.albedo,
             tile=surface.tile,
-            fade=(surface.reach / 2, surface.reach),
+            fade=surface.fade,
             background=surface.background,
         )
-        self._array.render(moderngl.TRIANGLE_STRIP)
+        array.render(moderngl.TRIANGLE_STRIP)
 
     def _texture(self, surface: GroundSurface) -> moderngl.Texture:
         pixels = surface.texture
@@ -100,8 +117,33 @@ class GroundPass:
 
     def release(self) -> None:
         """Free everything this pass made."""
-        for resource in (self._array, self._corners, self._white, self._program):
+        for resource in (self._alike, self._in_rooms, self._corners, self._white, *self._programs):
             resource.release()
         for _, texture in self._textures.values():
             texture.release()
         self._textures.clear()
+
+
+def metres_from_screen(viewer: Viewer, ground: Ground, surface: GroundSurface) -> NDArray[np.float64]:
+    """(3, 3) float64: from (x, y, 1) in clip space to homogeneous metres on the ground from the surface's middle."""
+    world_from_clip = np.linalg.inv(viewer.clip_from_world)
+    plane = ground.plane @ world_from_clip
+    clip_from_screen = np.eye(4)[:, [0, 1, 3]]
+    clip_from_screen[2] = -plane[[0, 1, 3]] / plane[2]
+    axes = _axes(ground)
+    metres_from_world = np.zeros((3, 4))
+    metres_from_world[:2, :3], metres_from_world[:2, 3] = axes, -axes @ _middle(ground, surface)
+    metres_from_world[2, 3] = 1
+    return metres_from_world @ world_from_clip @ clip_from_screen
+
+
+def _axes(ground: Ground) -> NDArray[np.float64]:
+    """Two unit vectors (2, 3) along the ground."""
+    axis = np.eye(3)[2] if abs(ground.normal[2]) < 0.9 else np.eye(3)[0]
+    right = np.cross(ground.normal, axis)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(ground.normal, right)])
+
+
+def _middle(ground: Ground, surface: GroundSurface) -> NDArray[np.float64]:
+    return np.array(surface.middle) - (ground.normal @ surface.middle - ground.offset) * ground.normal

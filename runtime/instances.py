@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from impostor.environment.reflection import Reflection
 from impostor.errors import SettingsError
 from impostor.fan import Fan
 from impostor.lighting import Gloss
-from impostor.views import Views, ring_bases
 from runtime.checks import check_type, numbers
+from runtime.placement import Placement, ViewVectors
 
 
 class Instances:
@@ -31,6 +32,8 @@ class Instances:
     scales : array_like, (N,) or () float
         Uniform, greater than 0.
     gloss : Gloss, optional
+    reflection : Reflection, optional
+        What the copies mirror of the rooms.
 
     Attributes
     ----------
@@ -56,16 +59,20 @@ class Instances:
         yaws: ArrayLike = 0.0,
         scales: ArrayLike = 1.0,
         gloss: Gloss | None = None,
+        reflection: Reflection | None = None,
     ):
         check_type("fan", fan, Fan, ", as impostor.load gives")
-        self.fan, self.gloss = fan, gloss or Gloss()
+        self.fan, self.gloss, self.reflection = fan, gloss or Gloss(), reflection
         check_type("gloss", self.gloss, Gloss)
+        if reflection is not None:
+            check_type("reflection", reflection, Reflection)
         self._positions = np.array(numbers(fan.name, "positions", positions, (-1, 3), (3,), (0,)).reshape(-1, 3))
         count = len(self._positions)
         self._yaws, self._scales, self._visible = np.zeros(count), np.ones(count), np.ones(count, bool)
         self._shares = np.ones(count, np.float32)
         self.yaws, self.scales = yaws, scales
         self.view_vectors = ViewVectors(fan.views)
+        self._placed: tuple[tuple[bytes, ...], Placement] | None = None
 
     @property
     def positions(self) -> NDArray[np.float64]:
@@ -119,8 +126,17 @@ class Instances:
     @property
     def key(self) -> tuple[object, ...]:
         """Equal while the copies stand as they stood."""
-        arrays = (self.positions, self.yaws, self.scales, self.visible, self.shares)
-        return (id(self.fan), self.gloss, *(array.tobytes() for array in arrays))
+        shown = self._visible.tobytes(), self._shares.tobytes()
+        return id(self.fan), self.gloss, self.reflection, self.placement, *shown
+
+    @property
+    def placement(self) -> Placement:
+        """Where the copies stand: the same object until a position, yaw or scale is another."""
+        arrays = self._positions, self._yaws, self._scales
+        written = tuple(array.tobytes() for array in arrays)
+        if self._placed is None or self._placed[0] != written:
+            self._placed = written, Placement.of(self.view_vectors, *arrays)
+        return self._placed[1]
 
 
 @dataclass(frozen=True)
@@ -186,20 +202,33 @@ class Viewer:
         direction *= np.sign(direction @ self.view_from_world[2, :3]) / np.linalg.norm(direction)
         return np.append(direction, 0.0)
 
-    def pixels_per_metre(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Size on screen (N,) of one metre across the line of sight at points (N, 3); 0 behind the camera."""
-        height = self.viewport[3] / 2 * abs(self.clip_from_view[1, 1])
-        w = points @ self.clip_from_world[3, :3] + self.clip_from_world[3, 3]
-        return np.where(w > 1e-9, height / np.maximum(w, 1e-9), 0.0)
-
-    def sees(self, points: NDArray[np.float64], radii: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Whether spheres around points (N, 3) with radii (N,) touch the view frustum."""
+    @cached_property
+    def planes(self) -> NDArray[np.float64]:
+        """(5, 4) float64: the frustum's sides and near end; with homogeneous points, metres on their inner side."""
         x, y, z, w = self.clip_from_world
         planes = np.stack([w + x, w - x, w + y, w - y, w + z])
         reach = np.sqrt((planes[:, :3] ** 2).sum(axis=1))
         # A plane at infinity has no direction, and everything on its inner side.
         reach[reach == 0] = np.inf
-        return (planes[:, :3] @ points.T + planes[:, 3:] > -reach[:, None] * radii).all(axis=0)
+        return planes / reach[:, None]
+
+    def pixels_per_metre(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Size on screen (N,) of one metre across the line of sight at points (N, 3); 0 behind the camera."""
+        height = self.viewport[3] / 2 * abs(self.clip_from_view[1, 1])
+        w = np.einsum("i,ni->n", self.clip_from_world[3, :3], points) + self.clip_from_world[3, 3]
+        return np.where(w > 1e-9, height / np.maximum(w, 1e-9), 0.0)
+
+    def nearness(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
+        """How much nearer (N,) points (N, 3) are than the camera's plane, in metres; negative for what it sees."""
+        back, offset = self.view_from_world[2, :3], self.view_from_world[2, 3]
+        return (np.einsum("i,ni->n", back, points) + offset).astype(np.float32)
+
+    def sees(self, points: NDArray[np.float64], radii: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether spheres around points (N, 3) with radii (N,) touch the view frustum."""
+        # Not a matrix product: with many points that starts threads, which takes longer than the work itself.
+        distances = np.einsum("pi,ni->pn", self.planes[:, :3], points)
+        distances += radii
+        return (distances > -self.planes[:, 3:]).all(axis=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,114 +237,79 @@ class Quads:
 
     Parameters
     ----------
+    placement : Placement
+        Of all the instances.
     index : ndarray, (N,) intp
-        Which instances.
+        Which of them.
     view : ndarray, (N,) intp
         The nearest view of the fan.
-    vectors : ndarray, (7, N, 3) float64
-        That view's right, up and back as turned in the world, and the four below.
     toward_eye : ndarray, (N, 3) float64
         Unit vectors.
-    scale : ndarray, (N,) float64
 
     Attributes
     ----------
+    scale : ndarray, (N,) float64
     basis : ndarray, (N, 3, 3) float64
-        Right, up and back; orthonormal.
+        The view's right, up and back as turned in the world; orthonormal.
     origin : ndarray, (N, 3) float64
         World position of the view's centre.
     center, right, up : ndarray, (N, 3) float64
         The quad: tile coordinates (x, y), in the view's metres, are drawn at `center + x right + y up`.
     """
 
+    placement: Placement
     index: NDArray[np.intp]
     view: NDArray[np.intp]
-    vectors: NDArray[np.float64]
     toward_eye: NDArray[np.float64]
-    scale: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.index)
 
-    @property
+    @cached_property
+    def scale(self) -> NDArray[np.float64]:
+        return self.placement.scales.take(self.index)
+
+    @cached_property
     def basis(self) -> NDArray[np.float64]:
-        return self.vectors[:3].swapaxes(0, 1)
+        return np.stack([self._turned(name).T for name in ("axis_right", "axis_up", "axis_back")], axis=1)
 
-    @property
+    @cached_property
+    def back(self) -> NDArray[np.float64]:
+        """The last of the basis (N, 3)."""
+        return self._turned("axis_back").T
+
+    @cached_property
     def origin(self) -> NDArray[np.float64]:
-        return self.vectors[3]
+        return self._placed("origin").T
 
-    @property
+    @cached_property
     def center(self) -> NDArray[np.float64]:
-        return self.vectors[4]
+        return self._placed("center").T
 
-    @property
+    @cached_property
     def right(self) -> NDArray[np.float64]:
-        return self.vectors[5]
+        return (self.scale * self._turned("right")).T
 
-    @property
+    @cached_property
     def up(self) -> NDArray[np.float64]:
-        return self.vectors[6]
+        return (self.scale * self._turned("up")).T
+
+    @cached_property
+    def _turns(self) -> NDArray[np.complex128]:
+        return self.placement.turns.take(self.index)
+
+    def _turned(self, name: str) -> NDArray[np.float64]:
+        return self.placement.view_vectors.turned(name, self.view, self._turns)
+
+    def _placed(self, name: str) -> NDArray[np.float64]:
+        vectors = self._turned(name)
+        vectors *= self.scale
+        vectors += self.placement.positions.take(self.index, axis=1)
+        return vectors
 
     def take(self, which: NDArray[Any]) -> Quads:
         """Some of them, by index or mask."""
-        if which.dtype == bool:
-            if which.all():
-                return self
-            which = np.flatnonzero(which)
-        parts = self.vectors.take(which, axis=1), self.toward_eye.take(which, axis=0)
-        return Quads(self.index[which], self.view[which], *parts, self.scale[which])
-
-
-class ViewVectors:
-    """A fan's views as many instances at once need them: found by direction, turned about +Y.
-
-    Parameters
-    ----------
-    views : Views
-
-    Attributes
-    ----------
-    middle : ndarray, (3,) float64
-        Of the views' centres.
-    reach : float
-        From there to the farthest corner of any quad.
-    """
-
-    def __init__(self, views: Views):
-        right, up, back = views.basis.swapaxes(0, 1)
-        offset, slope_right, slope_up = views.plane.T[..., None]
-        # A perspective camera's picture shrinks with the distance of the plane it falls on.
-        spread = 1 - offset / views.distance
-        center = views.center + offset * back
-        quad = center, spread * right + slope_right * back, spread * up + slope_up * back
-        vectors = np.stack([right, up, back, views.center, *quad])
-        # About +Y, z + ix turns as one complex number.
-        self._level, self._height = vectors[..., 2] + 1j * vectors[..., 0], vectors[..., 1].copy()
-        self.middle = views.center.mean(axis=0)
-        corners = [center + views.radius[:, None] * (quad[1] + side * quad[2]) for side in (-1, 1)]
-        corners += [center - views.radius[:, None] * (quad[1] + side * quad[2]) for side in (-1, 1)]
-        self.reach = float(np.linalg.norm(np.stack(corners) - self.middle, axis=-1).max())
-
-        ring = ring_bases(len(views), float(np.arcsin(np.clip(back[0, 1], -1, 1))))[:, 2]
-        self._views, self._is_ring = views, np.allclose(back, ring, rtol=0, atol=1e-9)
-
-    def nearest(self, x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.intp]:
-        """`Views.nearest` of directions (N,) in model space; of a ring without asking every view."""
-        if not self._is_ring:
-            return self._views.nearest(np.stack([x, y, z], axis=-1))
-        steps = np.arctan2(x, z) * (len(self._views) / (2 * np.pi))
-        return np.rint(steps).astype(np.intp) % len(self._views)
-
-    def turned(self, view: NDArray[np.intp], turn: NDArray[np.complex128]) -> NDArray[np.float64]:
-        """Vectors (7, N, 3) of some views, each turned by `turn` = exp(i yaw)."""
-        vectors = np.empty((len(self._level), len(view), 3))
-        # One after the other, temporaries stay small enough for the processor's cache.
-        for each, level, height in zip(vectors, self._level, self._height, strict=True):
-            turned = level.take(view)
-            turned *= turn
-            each[:, 0], each[:, 1], each[:, 2] = turned.imag, height.take(view), turned.real
-        return vectors
+        return Quads(self.placement, self.index[which], self.view[which], self.toward_eye[which])
 
 
 def nearest_views(
@@ -337,26 +331,17 @@ def nearest_views(
     toward : ndarray, (N, 3) float64
         Unit vectors from the instance toward the eye, world space.
     """
-    turn = np.exp(1j * instances.yaws[index])
-    return _nearest(instances, eye, turn, _middles(instances, index, turn))
-
-
-def _middles(instances: Instances, index: NDArray[np.intp], turn: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Where (N, 3) the middles of the fan's views stand in the world."""
-    x, y, z = instances.view_vectors.middle
-    level, scale = (z + 1j * x) * turn, instances.scales[index]
-    middles = instances.positions[index]
-    middles += np.stack([scale * level.imag, scale * y, scale * level.real], axis=-1)
-    return middles
+    return _nearest(instances.placement, eye, index)
 
 
 def _nearest(
-    instances: Instances, eye: NDArray[np.float64], turn: NDArray[np.complex128], middles: NDArray[np.float64]
+    placement: Placement, eye: NDArray[np.float64], index: NDArray[np.intp]
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    toward = eye[:3] - eye[3] * middles
-    toward /= np.maximum(np.sqrt(np.einsum("ni,ni->n", toward, toward)), 1e-12)[:, None]
-    level = (toward[:, 2] + 1j * toward[:, 0]) * turn.conj()
-    return instances.view_vectors.nearest(level.imag, toward[:, 1], level.real), toward
+    toward = eye[:3, None] - eye[3] * placement.middles.take(index, axis=1)
+    toward /= np.maximum(np.sqrt(np.square(toward).sum(axis=0)), 1e-12)
+    level = toward[2] + 1j * toward[0]
+    level *= placement.turns.take(index).conj()
+    return placement.view_vectors.nearest(level.imag, toward[1], level.real), toward.T
 
 
 def quads_toward(instances: Instances, eye: NDArray[np.float64], viewer: Viewer | None = None) -> Quads:
@@ -378,16 +363,9 @@ def quads_toward(instances: Instances, eye: NDArray[np.float64], viewer: Viewer 
     -------
     Quads
     """
-    # Not a number in any of them makes the sum none either.
-    finite = np.isfinite(instances.positions @ np.ones(3) + instances.yaws + instances.scales)
-    index = np.flatnonzero(instances.visible & finite & (instances.scales > 0))
-    turn = np.exp(1j * instances.yaws[index])
-    middles = _middles(instances, index, turn)
+    placement = instances.placement
+    shown = instances.visible & (placement.radii > 0)
     if viewer is not None:
-        seen = np.flatnonzero(viewer.sees(middles, instances.view_vectors.reach * instances.scales[index]))
-        index, turn, middles = index[seen], turn[seen], middles[seen]
-    view, toward = _nearest(instances, eye, turn, middles)
-    vectors, scale = instances.view_vectors.turned(view, turn), instances.scales[index]
-    vectors[3:] *= scale[:, None]
-    vectors[3:5] += instances.positions[index]
-    return Quads(index, view, vectors, toward, scale)
+        shown &= viewer.sees(placement.middles.T, placement.radii)
+    index = np.flatnonzero(shown)
+    return Quads(placement, index, *_nearest(placement, eye, index))

@@ -9,9 +9,12 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from impostor.environment.reflection import Reflection
+from impostor.environment.room import Room
 from impostor.errors import SettingsError
 from impostor.lighting import DirectionalLight
 from runtime.gpu import check_texture_size, set_uniforms
+from runtime.room_changes import RoomLight, room_change
 
 REMEMBERED = 256  # versions
 
@@ -35,8 +38,10 @@ class LightTable:
 
     Attributes
     ----------
+    rooms : tuple of Room
+        What is around, which is not in the texture.
     version : int
-        Grows whenever the lights change; what was lit with an older version is stale.
+        Grows whenever the lights or the rooms change; what was lit with an older version is stale.
     """
 
     def __init__(self, ctx: moderngl.Context):
@@ -45,13 +50,15 @@ class LightTable:
         self._texture = ctx.texture((2, 1), 4, dtype="f4")
         self._count = 0
         self._ambient = (0.0, 0.0, 0.0)
+        self.rooms: tuple[Room, ...] = ()
         self.version = 0
         self._past: dict[int, tuple[NDArray[Any], ...]] = {}
+        self._past_rooms: dict[int, tuple[RoomLight, ...]] = {}
 
-    def update(self, lights: Sequence[DirectionalLight], ambient: ArrayLike) -> None:
+    def update(self, lights: Sequence[DirectionalLight], ambient: ArrayLike, rooms: Sequence[Room] = ()) -> None:
         """Take over the lights of this frame; nothing is written when they are those of the last one."""
         red, green, blue = np.broadcast_to(np.asarray(ambient, float), (3,)).tolist()
-        wanted = (tuple(lights), (red, green, blue))
+        wanted = (tuple(lights), (red, green, blue), tuple(room.key for room in rooms))
         if wanted == self._held:
             return
         check_texture_size(self._ctx, f"{len(lights)} lights", 2, len(lights))
@@ -64,18 +71,27 @@ class LightTable:
         self._texture.write(rows.tobytes())
         self._texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._held, self._count, self._ambient = wanted, len(lights), (red, green, blue)
+        self.rooms = tuple(rooms)
         self.version += 1
         self._past[self.version] = rows[: len(lights), 0, :3], rows[: len(lights), 1, :3], np.array(self._ambient)
-        self._past.pop(self.version - REMEMBERED, None)
+        self._past_rooms[self.version] = tuple(RoomLight.of(room) for room in rooms)
+        for past in (self._past, self._past_rooms):
+            past.pop(self.version - REMEMBERED, None)
 
-    def change_since(self, versions: NDArray[np.int64]) -> NDArray[np.float64]:
+    def change_since(self, versions: NDArray[np.int64], reflection: Reflection | None = None) -> NDArray[np.float64]:
         """By how much what was lit with some versions (N,) can be off now, as linear light (N,).
 
-        A bound of the diffuse part; infinite where the number of lights was another or the version is forgotten.
+        A bound of the diffuse part of lights, and what `room_change` finds of surfaces with that reflection; infinite
+        where the number of lights was another or the version is forgotten.
         """
-        now = self._past[self.version]
         distinct, of_each = np.unique(versions, return_inverse=True)
-        return np.array([_change(self._past.get(int(version)), now) for version in distinct])[of_each]
+        return np.array([self._change(int(version), reflection) for version in distinct])[of_each]
+
+    def _change(self, version: int, reflection: Reflection | None) -> float:
+        of_lights = _change(self._past.get(version), self._past[self.version])
+        if np.isinf(of_lights):
+            return of_lights
+        return of_lights + room_change(self._past_rooms[version], self._past_rooms[self.version], reflection)
 
     def bind(self, program: moderngl.Program, unit: int) -> None:
         """Give a program that includes `lights.glsl` its uniforms."""

@@ -14,6 +14,7 @@ from impostor.model import Model
 from impostor.views import rotation_about_y
 from runtime.instances import Instances, Viewer
 from runtime.meshes import MeshBuffers, MeshCopies
+from runtime.placement import Placement
 
 # How far, in parts of the fan's radius, a mesh may reach beyond the object that was baked, or stay behind it.
 LARGEST_MISMATCH = 0.1
@@ -140,18 +141,15 @@ class Levels:
         """
         if seconds is None and self._chosen:
             return
-        with np.errstate(invalid="ignore"):
-            middles = self._middles()
-            size, off = self._size_and_elevation_off(viewer, middles)
-            seen = viewer.sees(middles, self.instances.view_vectors.reach * self.instances.scales)
-            self.as_mesh = self._wanted(size, off) & np.isfinite(middles @ np.ones(3))
+        placement = self.instances.placement
+        self.as_mesh = self._wanted(*self._size_and_elevation_off(viewer, placement)) & (placement.radii > 0)
         target = np.where(self.as_mesh, np.float32(0), np.float32(1))
         if seconds is None or not self._chosen or seconds >= self.settings.fade_seconds:
             self.fan_share = target
         else:
             step = np.float32(seconds / self.settings.fade_seconds)
             share = self.fan_share + np.clip(target - self.fan_share, -step, step)
-            self.fan_share = np.where(seen, share, target)
+            self.fan_share = np.where(viewer.sees(placement.middles.T, placement.radii), share, target)
         self._chosen = True
 
     def copies(self) -> list[MeshCopies]:
@@ -160,37 +158,26 @@ class Levels:
         near = np.flatnonzero(instances.visible & (share < 1))
         groups = near[share[near] == 0], near[share[near] > 0]
         return [
-            MeshCopies(self.buffers, instances.gloss, _world_from_model(instances, index), shares)
+            MeshCopies(self.buffers, instances.gloss, _world_from_model(instances, index), shares, instances.reflection)
             for index, shares in zip(groups, (None, share[groups[1]]), strict=True)
             if len(index)
         ]
 
-    def _middles(self) -> NDArray[np.float64]:
-        """Where (N, 3) the middles of the fan's views stand in the world; not numbers where a copy has none."""
-        instances = self.instances
-        x, y, z = instances.view_vectors.middle
-        cos, sin, scale = np.cos(instances.yaws), np.sin(instances.yaws), instances.scales
-        middles = instances.positions.copy()
-        middles[:, 0] += scale * (cos * x + sin * z)
-        middles[:, 1] += scale * y
-        middles[:, 2] += scale * (cos * z - sin * x)
-        return middles
-
     def _size_and_elevation_off(
-        self, viewer: Viewer, middles: NDArray[np.float64]
+        self, viewer: Viewer, placement: Placement
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Size on screen in pixels, and how far the camera is from the fan's elevations in radians: (N,) each."""
-        toward = viewer.eye[:3] - viewer.eye[3] * middles
-        distance = np.maximum(np.sqrt(np.einsum("ni,ni->n", toward, toward)), 1e-12)
+        toward = viewer.eye[:3, None] - viewer.eye[3] * placement.middles
+        distance = np.maximum(np.sqrt(np.square(toward).sum(axis=0)), 1e-12)
         # Clip w per metre of depth; of an orthographic camera w is the same everywhere.
         per_metre = np.linalg.norm(viewer.clip_from_world[3, :3])
         w = per_metre * distance if viewer.eye[3] else np.abs(viewer.clip_from_world[3, 3])
         focal = viewer.viewport[3] / 2 * abs(viewer.clip_from_view[1, 1])
-        elevation = np.arcsin(np.clip(toward[:, 1] / distance, -1, 1))
+        elevation = np.arcsin(np.clip(toward[1] / distance, -1, 1))
         # Half way between two elevations the other one becomes the nearest.
         nearest = np.searchsorted((self._elevations[1:] + self._elevations[:-1]) / 2, elevation)
         off = np.abs(self._elevations[nearest] - elevation)
-        return self._size * self.instances.scales * focal / w, off
+        return self._size * placement.scales * focal / w, off
 
     def _wanted(self, size: NDArray[np.float64], off: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Which copies (N,) are to be meshes; what is one already stays one for longer."""

@@ -9,9 +9,12 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from impostor.environment.reflection import Reflection
 from impostor.lighting import Gloss
 from impostor.model import Material, Model, Primitive
+from runtime.bump import Bump, bump_texture, with_tangents
 from runtime.checks import numbers
+from runtime.environments import RoomTable
 from runtime.gl_state import CallerState, set_state
 from runtime.gpu import SRGB8_ALPHA8, InstanceBuffer, check_texture_size, load_program, set_uniforms
 from runtime.instances import Viewer
@@ -19,18 +22,29 @@ from runtime.lights import LightTable
 
 ALPHA_MODES = {"OPAQUE": 0, "MASK": 1, "BLEND": 2}
 OUTPUTS = {"lit": 0, "albedo": 1, "normal": 2}
+LIGHTS_UNIT, BUMP_UNIT, ROOMS_UNIT = 1, 2, 3  # texture units beside the base texture's
 VERTEX_DTYPE = np.dtype([("position", "f4", (3,)), ("normal", "f4", (3,)), ("uv", "f4", (2,)), ("tint", "u1", (4,))])
+BUMPED_DTYPE = np.dtype([*VERTEX_DTYPE.descr, ("tangent", "f4", (4,))])
 VERTEX_FORMATS = {"position": ("3f", "12x"), "normal": ("3f", "12x"), "uv": ("2f", "8x"), "tint": ("4f1", "4x")}
+BUMPED_FORMATS = {**VERTEX_FORMATS, "tangent": ("4f", "16x")}
 COPY_DTYPE = np.dtype([("row_0", "f4", (4,)), ("row_1", "f4", (4,)), ("row_2", "f4", (4,)), ("fan_share", "f4")])
 COPY_FORMATS = {"row_0": ("4f", "16x"), "row_1": ("4f", "16x"), "row_2": ("4f", "16x"), "fan_share": ("1f", "4x")}
 
 
 class MeshPart:
-    """One primitive on the GPU: its buffers and its texture."""
+    """One primitive on the GPU, with tangents (N, 4) where it has them: its buffers and its texture."""
 
-    def __init__(self, ctx: moderngl.Context, primitive: Primitive, white: moderngl.Texture):
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        primitive: Primitive,
+        white: moderngl.Texture,
+        tangents: NDArray[np.float32] | None = None,
+    ):
         self.material: Material = primitive.material
-        vertices = np.zeros(len(primitive.positions), VERTEX_DTYPE)
+        vertices = np.zeros(len(primitive.positions), VERTEX_DTYPE if tangents is None else BUMPED_DTYPE)
+        if tangents is not None:
+            vertices["tangent"] = tangents
         vertices["position"], vertices["normal"] = primitive.positions, primitive.normals
         vertices["uv"] = 0 if primitive.uvs is None else primitive.uvs
         vertices["tint"] = 255 if primitive.colors is None else primitive.colors
@@ -59,12 +73,21 @@ class MeshBuffers:
     ----------
     ctx : moderngl.Context
     model : Model
+    bump : Bump, optional
+
+    Raises
+    ------
+    SettingsError
+        Bumps on a model without texture coordinates.
     """
 
-    def __init__(self, ctx: moderngl.Context, model: Model):
-        self.model = model
+    def __init__(self, ctx: moderngl.Context, model: Model, bump: Bump | None = None):
+        self.model, self.bump = model, bump
+        parts = model.primitives
+        prepared = [(part, None) if bump is None else with_tangents(model.name, part) for part in parts]
+        self.bumps = None if bump is None else bump_texture(ctx, bump)
         self._white = ctx.texture((1, 1), 4, b"\xff\xff\xff\xff")
-        self.parts = [MeshPart(ctx, primitive, self._white) for primitive in model.primitives]
+        self.parts = [MeshPart(ctx, part, self._white, tangents) for part, tangents in prepared]
         self._arrays: dict[tuple[int, int | None], list[moderngl.VertexArray]] = {}
         self.triangle_count = model.triangle_count
 
@@ -77,7 +100,7 @@ class MeshBuffers:
         """
         key = program.glo, copies and copies.buffer.glo
         if key not in self._arrays:
-            vertices = _layout(program, VERTEX_FORMATS)
+            vertices = _layout(program, VERTEX_FORMATS if self.bump is None else BUMPED_FORMATS)
             records = [] if copies is None else [(copies.buffer, *_layout(program, COPY_FORMATS, "/i"))]
             self._arrays[key] = [
                 ctx.vertex_array(program, [(part.vertices, *vertices), *records], part.indices) for part in self.parts
@@ -92,6 +115,8 @@ class MeshBuffers:
         for part in self.parts:
             part.release()
         self._white.release()
+        if self.bumps is not None:
+            self.bumps.release()
 
 
 @dataclass
@@ -104,11 +129,14 @@ class MeshInstance:
     world_from_model : ndarray, (4, 4) float
         Rotation, translation and uniform scale.
     gloss : Gloss
+    reflection : Reflection, optional
+        What it mirrors where there are rooms.
     """
 
     buffers: MeshBuffers
     world_from_model: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
     gloss: Gloss = field(default_factory=Gloss)
+    reflection: Reflection | None = None
 
 
 def check_places(meshes: Sequence[MeshInstance]) -> None:
@@ -139,21 +167,28 @@ class MeshCopies:
         Affine.
     fan_share : ndarray, (N,) float32, optional
         The part of each copy's pixels that is left to its fan, in a crossfade.
+    reflection : Reflection, optional
     """
 
     buffers: MeshBuffers
     gloss: Gloss
     world_from_model: NDArray[np.float64]
     fan_share: NDArray[np.float32] | None = None
+    reflection: Reflection | None = None
 
     @classmethod
     def gathered(cls, meshes: Sequence[MeshInstance]) -> list[MeshCopies]:
-        """Meshes that share buffers and gloss, put together."""
-        groups: dict[tuple[int, Gloss], list[MeshInstance]] = {}
+        """Meshes that share buffers, gloss and reflection, put together."""
+        groups: dict[tuple[int, Gloss, Reflection | None], list[MeshInstance]] = {}
         for mesh in meshes:
-            groups.setdefault((id(mesh.buffers), mesh.gloss), []).append(mesh)
+            groups.setdefault((id(mesh.buffers), mesh.gloss, mesh.reflection), []).append(mesh)
         return [
-            cls(group[0].buffers, group[0].gloss, np.array([mesh.world_from_model for mesh in group], float))
+            cls(
+                group[0].buffers,
+                group[0].gloss,
+                np.array([mesh.world_from_model for mesh in group], float),
+                reflection=group[0].reflection,
+            )
             for group in groups.values()
         ]
 
@@ -167,7 +202,7 @@ class MeshCopies:
         seen = np.flatnonzero(viewer.sees(centers, model.radius * np.sqrt(stretch)))
         seen = seen[np.argsort(-(centers[seen] @ viewer.view_from_world[2, :3]), kind="stable")]
         shares = None if self.fan_share is None else self.fan_share[seen]
-        return MeshCopies(self.buffers, self.gloss, self.world_from_model[seen], shares)
+        return MeshCopies(self.buffers, self.gloss, self.world_from_model[seen], shares, self.reflection)
 
     def records(self) -> NDArray[np.void]:
         """As (N,) COPY_DTYPE."""
@@ -189,8 +224,8 @@ class MeshPass:
 
     def __init__(self, ctx: moderngl.Context):
         self._ctx = ctx
-        self._program = load_program(ctx, "mesh.vert", "mesh.frag")
-        self._fading_program = load_program(ctx, "mesh.vert", "mesh_fading.frag")
+        names = "mesh", "mesh_fading", "mesh_bump", "mesh_room", "mesh_rooms"
+        self._programs = {name: load_program(ctx, "mesh.vert", f"{name}.frag") for name in names}
         self._copies = InstanceBuffer(ctx, COPY_DTYPE)
         self.statistics = {"meshes": 0, "triangles": 0}
 
@@ -200,10 +235,11 @@ class MeshPass:
         meshes: Sequence[MeshInstance],
         viewer: Viewer,
         lights: LightTable,
+        rooms: RoomTable,
         output: str = "lit",
     ) -> None:
         """Draw meshes; `output` is "lit", "albedo" or "normal" (view space, n / 2 + 1/2)."""
-        self.draw_copies(state, MeshCopies.gathered(meshes), viewer, lights, output)
+        self.draw_copies(state, MeshCopies.gathered(meshes), viewer, lights, rooms, output)
 
     def draw_copies(
         self,
@@ -211,19 +247,21 @@ class MeshPass:
         copies: Sequence[MeshCopies],
         viewer: Viewer,
         lights: LightTable,
+        rooms: RoomTable,
         output: str = "lit",
     ) -> None:
         """Draw copies that the viewer sees, one draw call for each part of what shares a mesh; else as `draw`."""
         self.statistics = {"meshes": 0, "triangles": 0}
         seen = [group.seen_by(viewer) for group in copies if len(group.world_from_model)]
         state.bind_target()
-        for program, fading in ((self._program, False), (self._fading_program, True)):
-            groups = [
-                group for group in seen if len(group.world_from_model) and (group.fan_share is not None) == fading
-            ]
+        around = len(rooms) if output == "lit" else 0
+        for name, program in self._programs.items():
+            groups = [group for group in seen if len(group.world_from_model) and _program_name(group, around) == name]
             if not groups:
                 continue
-            lights.bind(program, unit=1)
+            lights.bind(program, LIGHTS_UNIT)
+            if around:
+                rooms.bind(program, ROOMS_UNIT)
             set_uniforms(
                 program,
                 clip_from_world=viewer.clip_from_world,
@@ -237,6 +275,10 @@ class MeshPass:
     def _draw_group(self, program: moderngl.Program, group: MeshCopies) -> None:
         count = len(group.world_from_model)
         set_uniforms(program, gloss=(group.gloss.strength, group.gloss.shininess))
+        if "bumps" in program:
+            _set_bumps(program, group.buffers)
+        if "mirrors" in program:
+            _set_reflection(program, group.reflection)
         self._copies.write(group.records())
         draw_parts(self._ctx, group.buffers, program, copies=self._copies, count=count)
         self.statistics["meshes"] += count
@@ -244,8 +286,35 @@ class MeshPass:
 
     def release(self) -> None:
         """Free the programs and the buffer."""
-        for resource in (self._program, self._fading_program, self._copies):
+        for resource in (*self._programs.values(), self._copies):
             resource.release()
+
+
+def _program_name(group: MeshCopies, rooms: int) -> str:
+    """The cheapest program that draws copies among so many rooms."""
+    if rooms:
+        return "mesh_room" if rooms == 1 else "mesh_rooms"
+    if group.buffers.bump is not None:
+        return "mesh_bump"
+    return "mesh" if group.fan_share is None else "mesh_fading"
+
+
+def _set_bumps(program: moderngl.Program, buffers: MeshBuffers) -> None:
+    bump = buffers.bump
+    set_uniforms(program, bump_picture=BUMP_UNIT, bumps=int(bump is not None))
+    if bump is None or buffers.bumps is None:
+        return
+    buffers.bumps.use(BUMP_UNIT)
+    set_uniforms(program, bumpiness=bump.bumpiness)
+    if "plain_fresnel" in program:
+        set_uniforms(program, plain_fresnel=bump.plain_fresnel)
+
+
+def _set_reflection(program: moderngl.Program, reflection: Reflection | None) -> None:
+    set_uniforms(program, mirrors=int(reflection is not None), metal=0.0 if reflection is None else reflection.metal)
+    if reflection is not None:
+        terms = reflection.strength, reflection.least, reflection.exponent, reflection.roughness
+        set_uniforms(program, reflection=terms, any_power=int(reflection.exponent not in (4, 5)))
 
 
 def draw_parts(
@@ -256,10 +325,12 @@ def draw_parts(
     depth: bool = True,
     copies: InstanceBuffer | None = None,
     count: int = 1,
+    merge_bits: bool = False,
 ) -> None:
     """Draw every part of a mesh, or of `count` copies, with a program that includes `surface.glsl`."""
     for part, array in zip(buffers.parts, buffers.vertex_arrays(ctx, program, copies), strict=True):
-        set_state(depth_test=depth, depth_write=depth, cull_back=depth and not part.material.double_sided)
+        cull_back = depth and not part.material.double_sided
+        set_state(depth_test=depth, depth_write=depth, cull_back=cull_back, merge_bits=merge_bits)
         part.texture.use(0)
         surface = {
             "base_texture": 0,

@@ -17,8 +17,9 @@ from impostor.model import Model
 from impostor.shadow_projection import Ground
 from runtime.cameras import Camera
 from runtime.grounds import GroundSurface
+from runtime.light_settings import DEFAULT_AMBIENT, DEFAULT_LIGHTS
 from runtime.offscreen import Offscreen
-from runtime.renderer import DEFAULT_AMBIENT, DEFAULT_LIGHTS, ImpostorRenderer
+from runtime.renderer import ImpostorRenderer
 
 OUTPUTS = ("lit", "albedo", "normal", "depth", "alpha")
 MESH_SAMPLES = 4

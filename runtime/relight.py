@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from impostor.environment.reflection import Reflection
 from impostor.normal_code import BYTE_TO_NORMAL
+from runtime.environments import RoomTable
 from runtime.fan_textures import FanTextures
 from runtime.gl_state import set_state
 from runtime.gpu import InstanceBuffer, load_program, set_uniforms
@@ -21,13 +25,47 @@ ROW_DTYPE = np.dtype(
         ("gloss", "f4", (2,)),
     ]
 )
+PLACE_DTYPE = np.dtype(
+    [
+        ("center", "f4", (3,)),
+        ("scale", "f4"),
+        ("weights", "f4", (4,)),
+        ("mirrored", "f4", (4,)),
+        ("view", "f4"),
+        ("padding", "f4", (3,)),
+    ]
+)
 SPAN_DTYPE = np.dtype([("first", "f4"), ("end", "f4")])
 TILE_DTYPE = np.dtype([("place", "f4", (4,)), ("part", "f4", (4,)), ("origin", "f4", (3,))])
 CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]], np.float32)
 
 
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What the rows of a colormap have around them.
+
+    Parameters
+    ----------
+    rooms : RoomTable
+        At least one room.
+    places : ndarray, (N,) PLACE_DTYPE
+        For each row: the view's centre in the world, the instance's scale, each room's part in the diffuse light, 1
+        for the room that is mirrored, and the view. In one room all but the centre and the scale are left alone.
+    reflection : Reflection, optional
+    points : moderngl.Texture, optional
+        `FanTextures.points`, for what mirrors.
+    """
+
+    rooms: RoomTable
+    places: NDArray[np.void]
+    reflection: Reflection | None = None
+    points: moderngl.Texture | None = None
+
+
 class ColormapPass:
-    """Evaluates colormaps on the GPU, one texture row each; equals `impostor.lighting.colormap`.
+    """Evaluates colormaps on the GPU, one texture row each.
+
+    Equals `impostor.lighting.colormap`, and with surroundings `impostor.environment.colormap`.
 
     Attributes
     ----------
@@ -39,52 +77,95 @@ class ColormapPass:
     ROWS = 1024
 
     def __init__(self, ctx: moderngl.Context):
-        self._program = load_program(ctx, "colormap.vert", "colormap.frag")
+        self._ctx = ctx
         self._normals = ctx.texture((256, 1), 4, _padded_normals().tobytes(), dtype="f4")
         self.texture = ctx.texture((512, self.ROWS), 4, dtype="f4")
         self._rows = ctx.texture((ROW_DTYPE.itemsize // 16, self.ROWS), 4, dtype="f4")
-        for texture in (self.texture, self._normals, self._rows):
+        self._places = ctx.texture((PLACE_DTYPE.itemsize // 16, self.ROWS), 4, dtype="f4")
+        for texture in (self.texture, self._normals, self._rows, self._places):
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._target = ctx.framebuffer([self.texture])
         self._corners = ctx.buffer(CORNERS)
         self._spans = InstanceBuffer(ctx, SPAN_DTYPE)
-        layout = [(self._corners, "2f", "corner"), (self._spans.buffer, "2f/i", "span")]
-        self._array = ctx.vertex_array(self._program, layout)
+        self._arrays = {"colormap": self._array("colormap")}
 
-    def write(self, rows: NDArray[np.void], lights: LightTable, normals_for: NDArray[np.float64] | None = None) -> None:
-        """Fill the rows named in a ROW_DTYPE array; changes the bound framebuffer and texture units 0 to 2.
+    def _array(self, name: str) -> moderngl.VertexArray:
+        program = load_program(self._ctx, "colormap.vert", f"{name}.frag")
+        layout = [(self._corners, "2f", "corner"), (self._spans.buffer, "2f/i", "span")]
+        return self._ctx.vertex_array(program, layout)
+
+    def write(
+        self,
+        rows: NDArray[np.void],
+        lights: LightTable,
+        normals_for: NDArray[np.float64] | None = None,
+        surroundings: Surroundings | None = None,
+    ) -> None:
+        """Fill the rows named in a ROW_DTYPE array; changes the bound framebuffer and texture units 0 to 5.
 
         With `normals_for`, a viewer's (3, 3) rotation from world to view, the entries are that viewer's normals as
         n / 2 + 1/2 instead of light.
         """
-        rows = rows[np.argsort(rows["row"])]
+        order = np.argsort(rows["row"])
+        rows = rows[order]
         # Neighbouring rows are one rectangle: a rasteriser that works on blocks of pixels wastes most of a thin one.
-        runs = np.split(rows, np.flatnonzero(np.diff(rows["row"]) != 1) + 1)
-        for run in runs:
-            self._rows.write(run.tobytes(), viewport=(0, int(run["row"][0]), self._rows.width, len(run)))
-        self._spans.write(np.array([(run["row"][0], run["row"][-1] + 1) for run in runs], SPAN_DTYPE))
+        runs = np.split(np.arange(len(rows)), np.flatnonzero(np.diff(rows["row"]) != 1) + 1)
+        self._upload(self._rows, rows, rows["row"], runs)
+        if surroundings is not None:
+            self._upload(self._places, surroundings.places[order], rows["row"], runs)
+        ends = [(rows["row"][run[0]], rows["row"][run[-1]] + 1) for run in runs]
+        self._spans.write(np.array(ends, SPAN_DTYPE))
         self._target.use()
         set_state()
+        array = self._lit_by(lights, surroundings)
+        if surroundings is None:
+            show_normals = normals_for is not None
+            viewer = normals_for if show_normals else np.eye(3)
+            set_uniforms(array.program, show_normals=show_normals, view_from_world=viewer)
         self._normals.use(0)
-        lights.bind(self._program, unit=1)
         self._rows.use(2)
-        show_normals = normals_for is not None
-        set_uniforms(
-            self._program,
-            byte_to_normal=0,
-            rows=2,
-            row_count=self.ROWS,
-            columns=256 if rows["albedo"][:, 3].all() else 512,
-            show_normals=show_normals,
-            view_from_world=normals_for if show_normals else np.eye(3),
-        )
-        self._array.render(moderngl.TRIANGLE_STRIP, instances=len(runs))
+        columns = 256 if rows["albedo"][:, 3].all() else 512
+        set_uniforms(array.program, byte_to_normal=0, rows=2, row_count=self.ROWS, columns=columns)
+        array.render(moderngl.TRIANGLE_STRIP, instances=len(runs))
+
+    def _upload(
+        self,
+        texture: moderngl.Texture,
+        records: NDArray[np.void],
+        numbers: NDArray[np.float32],
+        runs: list[NDArray[np.intp]],
+    ) -> None:
+        for run in runs:
+            place = (0, int(numbers[run[0]]), texture.width, len(run))
+            texture.write(records[run[0] : run[-1] + 1].tobytes(), viewport=place)
+
+    def _lit_by(self, lights: LightTable, surroundings: Surroundings | None) -> moderngl.VertexArray:
+        """The cheapest program under these lights, ready but for its rows."""
+        rooms = 0 if surroundings is None else len(surroundings.rooms)
+        name = "colormap" if rooms == 0 else "colormap_room" if rooms == 1 else "colormap_rooms"
+        if name not in self._arrays:
+            self._arrays[name] = self._array(name)
+        program = self._arrays[name].program
+        lights.bind(program, unit=1)
+        if surroundings is not None:
+            surroundings.rooms.bind(program, 3)
+            _set_reflection(program, surroundings.reflection)
+            self._places.use(4)
+            if surroundings.points is not None:
+                surroundings.points.use(5)
+            set_uniforms(program, places=4, points=5)
+        return self._arrays[name]
 
     def release(self) -> None:
         """Free everything this pass made."""
+        for array in self._arrays.values():
+            program = array.program
+            array.release()
+            program.release()
+        self._arrays.clear()
         for resource in (
-            self._array,
             self._rows,
+            self._places,
             self._spans,
             self._corners,
             self._target,
@@ -92,7 +173,6 @@ class ColormapPass:
             self._normals,
         ):
             resource.release()
-        self._program.release()
 
 
 class RelightPass:
@@ -148,3 +228,10 @@ class RelightPass:
 
 def _padded_normals() -> NDArray[np.float32]:
     return np.pad(BYTE_TO_NORMAL, ((0, 0), (0, 1))).astype(np.float32)
+
+
+def _set_reflection(program: moderngl.Program, reflection: Reflection | None) -> None:
+    set_uniforms(program, mirrors=int(reflection is not None), metal=0.0 if reflection is None else reflection.metal)
+    if reflection is not None:
+        terms = reflection.strength, reflection.least, reflection.exponent, reflection.roughness
+        set_uniforms(program, reflection=terms, any_power=int(reflection.exponent not in (4, 5)))

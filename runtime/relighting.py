@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from impostor.environment.blending import diffuse_weights, mirrored_room
+from impostor.environment.reflection import Reflection
+from impostor.environment.room import Room
 from impostor.lighting import Gloss
+from runtime.environments import RoomTable
 from runtime.fan_textures import FanTextures
 from runtime.instances import Quads
 from runtime.lights import LightTable
-from runtime.relight import ROW_DTYPE, TILE_DTYPE, ColormapPass, RelightPass
+from runtime.relight import PLACE_DTYPE, ROW_DTYPE, TILE_DTYPE, ColormapPass, RelightPass, Surroundings
 from runtime.tiles import TileCache, TileIndex
 
 # While lights change from frame to frame, so many texels are relit in each; what is left of them follows.
@@ -34,23 +39,33 @@ class ShownTiles:
     textures : FanTextures
     gloss : Gloss
     index : TileIndex
+    quads : Quads
+    levels : ndarray, (N,) intp
+        Mip level of every quad's tile.
     of_quads : ndarray, (N,) intp
         Entry in the index of every quad's tile.
+    shown_by : ndarray, (M,) intp
+        One of the quads that show each tile.
+    reflection : Reflection, optional
+
+    Attributes
+    ----------
     entries : ndarray, (M,) intp
-        The distinct ones.
-    quads : Quads
-        One that shows each of them.
-    levels : ndarray, (M,) intp
-        Their mip levels.
+        Of the tiles in the index.
     """
 
     textures: FanTextures
     gloss: Gloss
     index: TileIndex
-    of_quads: NDArray[np.intp]
-    entries: NDArray[np.intp]
     quads: Quads
     levels: NDArray[np.intp]
+    of_quads: NDArray[np.intp]
+    shown_by: NDArray[np.intp]
+    reflection: Reflection | None = None
+
+    @cached_property
+    def entries(self) -> NDArray[np.intp]:
+        return self.of_quads.take(self.shown_by)
 
     @property
     def versions(self) -> NDArray[np.int64]:
@@ -78,59 +93,107 @@ class Relighter:
         self,
         shown: Sequence[ShownTiles],
         lights: LightTable,
+        rooms: RoomTable,
         cache: TileCache,
         normals_for: NDArray[np.float64] | None = None,
     ) -> int:
         """Relight tiles that are new or stale; returns how many.
 
         New ones, and those off by more than LARGEST_ERROR, at once; of the others the worst, up to TEXELS_A_FRAME.
-        With `normals_for`, a viewer's (3, 3) rotation from world to view, tiles show its normals instead of light.
+        `rooms` holds those of the lights, where they have any. With `normals_for`, a viewer's (3, 3) rotation from
+        world to view, tiles show its normals instead of light.
         """
-        count = 0
-        for tiles, chosen in zip(shown, due_tiles(shown, lights), strict=True):
-            # Batches of one fan share tiles: another may have relit some by now.
-            chosen = chosen & (tiles.versions != lights.version)
-            new = tiles.versions < 0
-            for part in (np.flatnonzero(chosen & new), np.flatnonzero(chosen & ~new)):
-                for start in range(0, len(part), self._colormaps.ROWS):
-                    self._relight_some(tiles, part[start : start + self._colormaps.ROWS], lights, cache, normals_for)
-            tiles.index.versions[tiles.entries[chosen]] = lights.version
-            count += int(np.count_nonzero(chosen))
-        return count
+        stale, new = [], []
+        for tiles, due in zip(shown, due_tiles(shown, lights), strict=True):
+            # Batches of one fan share tiles: the first of them relights those.
+            due = due & (tiles.versions != lights.version)
+            stale.append(np.flatnonzero(due & (tiles.versions >= 0)))
+            new.append(np.flatnonzero(due & (tiles.versions < 0)))
+            tiles.index.versions[tiles.entries[due]] = lights.version
+        for chosen in (stale, new):
+            for sheet in _sheets(shown, chosen, self._colormaps.ROWS):
+                self._relight_sheet(sheet, chosen is new, lights, rooms, cache, normals_for)
+        return sum(map(len, stale)) + sum(map(len, new))
 
-    def _relight_some(
+    def _relight_sheet(
         self,
-        tiles: ShownTiles,
-        chosen: NDArray[np.intp],
+        sheet: Sequence[tuple[ShownTiles, NDArray[np.intp]]],
+        new: bool,
         lights: LightTable,
+        rooms: RoomTable,
         cache: TileCache,
         normals_for: NDArray[np.float64] | None,
     ) -> None:
-        """Relight some of a fan's tiles, either all of them new or none."""
-        fan, entries, levels = tiles.textures, tiles.entries[chosen], tiles.levels[chosen]
-        views, bases = tiles.quads.view[chosen], tiles.quads.basis[chosen]
-        new = bool(tiles.index.versions[entries[0]] < 0)
-        firsts, row_of_tile = distinct_turns(bases)
-        rows = np.zeros(len(firsts), ROW_DTYPE)
-        rows["row"], rows["basis"] = np.arange(len(rows)), bases[firsts]
-        rows["albedo"], rows["gloss"] = fan.albedo, (tiles.gloss.strength, tiles.gloss.shininess)
-        self._colormaps.write(rows, lights, normals_for)
-        work = np.zeros(len(chosen), TILE_DTYPE)
-        work["place"][:, :3], work["place"][:, 3] = tiles.index.places[entries], levels
-        work["origin"][:, :2], work["origin"][:, 2] = fan.tile_origins(views, levels), row_of_tile
-        # A new tile is drawn whole, because another may lie beneath.
-        work["part"][:, 2:] = work["place"][:, 2:3]
-        if not new:
-            covered = fan.fan.covered_rectangles[views]
-            work["part"][:, :2] = np.maximum((covered[:, :2] >> levels[:, None]) - 1, 0)
-            reach = (covered[:, 2:] - 1 >> levels[:, None]) + 2
-            work["part"][:, 2:] = np.minimum(reach, work["part"][:, 2:])
-        self._relight.draw(fan, work, self._colormaps.texture, cache, normals=normals_for is not None, depth=new)
+        """Relight tiles whose colormaps fit in one texture, either all of them new or none."""
+        in_rooms, row_count = bool(lights.rooms) and normals_for is None, 0
+        work, rows, places = [], [], []
+        for tiles, chosen in sheet:
+            quads = tiles.quads.take(tiles.shown_by[chosen])
+            firsts, row_of_tile = np.arange(len(quads)), np.arange(len(quads))
+            if light_is_everywhere_alike(lights.rooms, tiles.reflection):
+                firsts, row_of_tile = distinct_turns(quads.basis)
+            work.append(_tile_records(tiles, chosen, quads.view, row_count + row_of_tile, new))
+            rows.append(_row_records(tiles, quads.basis[firsts], row_count))
+            row_count += len(firsts)
+            if in_rooms:
+                places.append(_places(quads.take(firsts), lights))
+        around = None
+        if in_rooms:
+            reflection = sheet[0][0].reflection
+            points = None if reflection is None else sheet[0][0].textures.points
+            around = Surroundings(rooms, np.concatenate(places), reflection, points)
+        self._colormaps.write(np.concatenate(rows), lights, normals_for, around)
+        for (tiles, _), records in zip(sheet, work, strict=True):
+            show_normals = normals_for is not None
+            self._relight.draw(tiles.textures, records, self._colormaps.texture, cache, show_normals, depth=new)
 
     def release(self) -> None:
         """Free everything."""
         self._colormaps.release()
         self._relight.release()
+
+
+def _sheets(
+    shown: Sequence[ShownTiles], chosen: Sequence[NDArray[np.intp]], most: int
+) -> Iterator[list[tuple[ShownTiles, NDArray[np.intp]]]]:
+    """The chosen tiles, of as many fans together as stay within `most` tiles; of one fan where it mirrors."""
+    sheet, free = [], most
+    for tiles, which in zip(shown, chosen, strict=True):
+        while len(which):
+            if sheet and (not free or tiles.reflection or sheet[-1][0].reflection):
+                yield sheet
+                sheet, free = [], most
+            sheet.append((tiles, which[:free]))
+            which, free = which[free:], free - len(sheet[-1][1])
+    if sheet:
+        yield sheet
+
+
+def _row_records(tiles: ShownTiles, bases: NDArray[np.float64], first: int) -> NDArray[np.void]:
+    """ROW_DTYPE records of a fan's colormaps, in rows from `first` on."""
+    rows = np.zeros(len(bases), ROW_DTYPE)
+    rows["row"] = np.arange(first, first + len(bases))
+    rows["basis"], rows["albedo"] = bases, tiles.textures.albedo
+    rows["gloss"] = tiles.gloss.strength, tiles.gloss.shininess
+    return rows
+
+
+def _tile_records(
+    tiles: ShownTiles, chosen: NDArray[np.intp], views: NDArray[np.intp], rows: NDArray[np.intp], new: bool
+) -> NDArray[np.void]:
+    """TILE_DTYPE records of some tiles that show these views through these rows of the colormap."""
+    fan, levels = tiles.textures, tiles.levels[tiles.shown_by[chosen]]
+    work = np.zeros(len(chosen), TILE_DTYPE)
+    work["place"][:, :3], work["place"][:, 3] = tiles.index.places[tiles.entries[chosen]], levels
+    work["origin"][:, :2], work["origin"][:, 2] = fan.tile_origins(views, levels), rows
+    # A new tile is drawn whole, because another may lie beneath.
+    work["part"][:, 2:] = work["place"][:, 2:3]
+    if not new:
+        covered = fan.fan.covered_rectangles[views]
+        work["part"][:, :2] = np.maximum((covered[:, :2] >> levels[:, None]) - 1, 0)
+        reach = (covered[:, 2:] - 1 >> levels[:, None]) + 2
+        work["part"][:, 2:] = np.minimum(reach, work["part"][:, 2:])
+    return work
 
 
 def due_tiles(shown: Sequence[ShownTiles], lights: LightTable) -> list[NDArray[np.bool_]]:
@@ -142,12 +205,29 @@ def due_tiles(shown: Sequence[ShownTiles], lights: LightTable) -> list[NDArray[n
     texels = [tiles.texels for tiles in shown]
     if sum(int(each[which].sum()) for each, which in zip(texels, stale, strict=True)) <= TEXELS_A_FRAME:
         return stale
-    errors = np.concatenate([lights.change_since(each) for each in versions])
+    errors = np.concatenate(
+        [lights.change_since(each, tiles.reflection) for each, tiles in zip(versions, shown, strict=True)]
+    )
     sizes = np.concatenate(texels)
     order = np.argsort(-errors, kind="stable")
     due = errors > LARGEST_ERROR
     due[order] |= (np.cumsum(sizes[order]) <= TEXELS_A_FRAME) & (errors[order] > 0)
     return np.split(due, np.cumsum([len(each) for each in versions])[:-1])
+
+
+def light_is_everywhere_alike(rooms: Sequence[Room], reflection: Reflection | None) -> bool:
+    """Whether it makes no difference to the light where a copy stands."""
+    return all(room.shape == "far" for room in rooms) or (len(rooms) == 1 and reflection is None)
+
+
+def _places(quads: Quads, lights: LightTable) -> NDArray[np.void]:
+    """What surrounds some quads, as PLACE_DTYPE."""
+    places = np.zeros(len(quads), PLACE_DTYPE)
+    places["center"], places["scale"], places["view"] = quads.origin, quads.scale, quads.view
+    if len(lights.rooms) > 1:
+        places["weights"][:, : len(lights.rooms)] = diffuse_weights(lights.rooms, quads.origin)
+        places["mirrored"][np.arange(len(places)), mirrored_room(lights.rooms, quads.origin)] = 1
+    return places
 
 
 def distinct_turns(bases: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -2,36 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import moderngl
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from impostor.environment.reflection import Reflection
+from impostor.environment.room import Room
 from impostor.errors import GpuError, SettingsError
 from impostor.fan import Fan
-from impostor.lighting import DirectionalLight, Gloss, LocalLight
+from impostor.lighting import Gloss
 from impostor.model import Model
 from impostor.ptm.quantise import Ptm
 from impostor.shadow_projection import Ground
+from runtime.bump import Bump
 from runtime.checks import check_type, numbers
+from runtime.environments import RoomTable, check_rooms
 from runtime.fan_textures import FanTextures
 from runtime.gl_state import CallerState, preserved_state
 from runtime.grounds import GroundPass, GroundSurface
 from runtime.impostors import Batch, ImpostorPass
 from runtime.instances import Instances, Viewer
+from runtime.light_settings import LightSettings
 from runtime.lights import LightTable, check_lights
 from runtime.lod import FrameClock, LevelOfDetail, Levels, check_same_object
+from runtime.memory import memory_held
 from runtime.meshes import OUTPUTS, MeshBuffers, MeshInstance, MeshPass, check_places
+from runtime.rooms import RoomPass, to_show
 from runtime.shadows import ShadowPass
 from runtime.surfaces import Surface, SurfacePass
 
-DEFAULT_LIGHTS = (DirectionalLight.from_angles(40, 45, (0.75, 0.75, 0.75)),)
-DEFAULT_AMBIENT = 0.25
 
-
-class ImpostorRenderer:
+class ImpostorRenderer(LightSettings):
     """Draws relightable fans, meshes and their shadows into whatever framebuffer the caller has bound.
 
     Every `draw...` call takes the caller's two camera matrices, (4, 4) column-vector matrices as read on paper, draws
@@ -53,6 +57,13 @@ class ImpostorRenderer:
 
     local_lights : sequence of LocalLight
         Lamps in the scene; only surfaces with PTMs show their light.
+    rooms : sequence of Room
+        Surroundings that light fans and meshes and that they mirror, MAX_ROOMS at most. May be replaced or changed in
+        place at any time.
+    shadow_lights : int
+        How many of the brightest lights of each room cast shadows; 0 for none.
+    contact_shadows : ContactShadows or None
+        Whether `draw_shadows` also darkens the ground around the feet of what stands on it, and how.
 
     Examples
     --------
@@ -63,38 +74,17 @@ class ImpostorRenderer:
     """
 
     def __init__(self, ctx: moderngl.Context, cache_side: int = 4096):
+        super().__init__()
         self._ctx, self._released = ctx, False
-        self.lights, self.ambient = DEFAULT_LIGHTS, DEFAULT_AMBIENT
-        self.local_lights: Sequence[LocalLight] = ()
         with preserved_state(ctx):
             self._impostors = ImpostorPass(ctx, cache_side)
             self._mesh_pass, self._ground_pass, self._shadows = MeshPass(ctx), GroundPass(ctx), ShadowPass(ctx)
             self._surface_pass, self._table = SurfacePass(ctx), LightTable(ctx)
+            self._room_table, self._room_pass = RoomTable(ctx), RoomPass(ctx)
         self._clock, self._statistics = FrameClock(), self._mesh_pass.statistics
         self._batches: list[Batch] = []
         self._meshes: list[MeshInstance] = []
         self._surfaces: list[Surface] = []
-
-    @property
-    def lights(self) -> Sequence[DirectionalLight]:
-        return self._lights
-
-    @lights.setter
-    def lights(self, lights: Sequence[DirectionalLight]) -> None:
-        check_lights(lights)
-        self._lights = lights
-
-    @property
-    def ambient(self) -> NDArray[np.float64]:
-        return self._ambient
-
-    @ambient.setter
-    def ambient(self, ambient: ArrayLike) -> None:
-        light = np.array(np.broadcast_to(numbers("ambient", "light", ambient, (), (3,)), (3,)))
-        if np.any(light < 0):
-            raise SettingsError("ambient", f"light goes down to {light.min():g}; expected at least 0")
-        light.flags.writeable = False
-        self._ambient = light
 
     def add(
         self,
@@ -104,6 +94,7 @@ class ImpostorRenderer:
         scales: ArrayLike = 1.0,
         gloss: Gloss | None = None,
         *,
+        reflection: Reflection | None = None,
         model: Model | None = None,
         level_of_detail: LevelOfDetail | None = None,
     ) -> Instances:
@@ -111,7 +102,7 @@ class ImpostorRenderer:
 
         Parameters
         ----------
-        fan, positions, yaws, scales, gloss
+        fan, positions, yaws, scales, gloss, reflection
             As `Instances`.
         model : Model, optional
             What the fan was baked from: copies near the camera are drawn as this mesh. Their shadows stay the fan's.
@@ -125,7 +116,7 @@ class ImpostorRenderer:
             without a model.
         """
         self._check_in_use()
-        instances = Instances(fan, positions, yaws, scales, gloss)
+        instances = Instances(fan, positions, yaws, scales, gloss, reflection)
         levels = None
         if model is not None:
             check_type("model", model, Model, ", as impostor.load_model gives")
@@ -142,7 +133,15 @@ class ImpostorRenderer:
         self._batches.append(Batch(instances, textures, levels))
         return instances
 
-    def add_mesh(self, model: Model, world_from_model: ArrayLike | None = None, gloss: Gloss | None = None):
+    def add_mesh(
+        self,
+        model: Model,
+        world_from_model: ArrayLike | None = None,
+        gloss: Gloss | None = None,
+        *,
+        reflection: Reflection | None = None,
+        bump: Bump | None = None,
+    ) -> MeshInstance:
         """Place a polygon mesh.
 
         Parameters
@@ -152,16 +151,21 @@ class ImpostorRenderer:
         world_from_model : array_like, (4, 4) float, optional
             Rotation, translation and uniform scale.
         gloss : Gloss, optional
+        reflection : Reflection, optional
+            What it mirrors of the rooms.
+        bump : Bump, optional
+            For a model with texture coordinates.
 
         Returns
         -------
         MeshInstance
-            Its `world_from_model` may be changed at any time.
+            Its `world_from_model` and `reflection` may be changed at any time.
 
         Raises
         ------
         SettingsError
-            No model; a matrix of another shape, with a number that is not finite, or without an inverse.
+            No model; a matrix of another shape, with a number that is not finite, or without an inverse; bumps on a
+            model without texture coordinates.
         """
         self._check_in_use()
         check_type("model", model, Model, ", as impostor.load_model gives")
@@ -169,7 +173,11 @@ class ImpostorRenderer:
         matrix = np.array(numbers(model.name, "world_from_model", given, (4, 4)))
         if not abs(np.linalg.det(matrix)) > 0:
             raise SettingsError(model.name, "world_from_model has no inverse; expected a matrix that has one")
-        self._meshes.append(MeshInstance(self._mesh_buffers(model), matrix, gloss or Gloss()))
+        if reflection is not None:
+            check_type("reflection", reflection, Reflection)
+        if bump is not None:
+            check_type("bump", bump, Bump)
+        self._meshes.append(MeshInstance(self._mesh_buffers(model, bump), matrix, gloss or Gloss(), reflection))
         return self._meshes[-1]
 
     def add_surface(
@@ -260,65 +268,117 @@ class ImpostorRenderer:
             for each in levels:
                 each.update(viewer, seconds)
             near = [copies for each in levels for copies in each.copies()]
-            self._mesh_pass.draw_copies(state, near, viewer, self._table, output)
+            self._mesh_pass.draw_copies(state, near, viewer, self._table, self._room_table, output)
             self._statistics = self._mesh_pass.statistics
-            self._impostors.draw(state, self._batches, viewer, self._table, output)
+            self._impostors.draw(state, self._batches, viewer, self._table, self._room_table, output)
 
     def draw_meshes(self, clip_from_view: ArrayLike, view_from_world: ArrayLike, output: str = "lit") -> None:
         """Draw the meshes that `add_mesh` placed; parameters as `draw`."""
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
             self._update_lights(output)
-            self._mesh_pass.draw(state, self._meshes, viewer, self._table, output)
+            self._mesh_pass.draw(state, self._meshes, viewer, self._table, self._room_table, output)
+
+    def draw_rooms(self, clip_from_view: ArrayLike, view_from_world: ArrayLike) -> None:
+        """Draw the rooms as background, from inside: the first far one as the sky, others as what they are.
+
+        Depth is tested, so that it does not matter what is drawn first, and written where a room has some size.
+        """
+        with self._frame(clip_from_view, view_from_world) as (state, viewer):
+            self._room_table.update(self._rooms)
+            self._room_pass.draw(state, self._rooms, self._room_table, viewer)
+
+    def draw_room_on(
+        self,
+        clip_from_view: ArrayLike,
+        view_from_world: ArrayLike,
+        room: Room,
+        shape: str,
+        world_from_shape: ArrayLike | None = None,
+    ) -> None:
+        """Draw one of the rooms on something simple: what each point shows is the environment toward it.
+
+        Parameters
+        ----------
+        clip_from_view, view_from_world : array_like, (4, 4) float
+        room : Room
+            One of `rooms`.
+        shape : {"box", "sphere", "cylinder", "plane"}
+            Within the cube from -1 to 1; the cylinder stands upright, the plane is the wall toward -z.
+        world_from_shape : array_like, (4, 4) float, optional
+            Where it is; the room's `world_from_room` if not told otherwise.
+
+        Raises
+        ------
+        SettingsError
+            A room that is not one of `rooms`, another shape, a matrix without an inverse.
+        """
+        number, matrix = to_show(self._rooms, room, shape, world_from_shape)
+        with self._frame(clip_from_view, view_from_world) as (state, viewer):
+            self._room_table.update(self._rooms)
+            self._room_pass.draw_on(state, number, self._room_table, viewer, shape, matrix)
 
     def draw_surfaces(self, clip_from_view: ArrayLike, view_from_world: ArrayLike, output: str = "lit") -> None:
         """Draw the surfaces that `add_surface` placed; parameters as `draw`. Draw shadows after the ground's."""
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
             lights = [*self._lights, *self.local_lights]
-            self._surface_pass.draw(state, self._surfaces, viewer, lights, self._ambient, output)
+            self._surface_pass.draw(state, self._surfaces, viewer, lights, self._ambient, output, self._rooms)
 
     def draw_ground(
         self, clip_from_view: ArrayLike, view_from_world: ArrayLike, ground: Ground, surface: GroundSurface
     ) -> None:
-        """Draw a lit plane, for callers who have no ground of their own."""
+        """Draw a plane, lit by lights and rooms, for callers who have no ground of their own."""
         check_type("ground", ground, Ground)
         _check_surface(surface)
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
             self._update_lights("lit")
-            self._ground_pass.draw(state, viewer, self._table, ground, surface)
+            self._ground_pass.draw(state, viewer, self._table, self._room_table, ground, surface)
 
-    def draw_shadows(self, clip_from_view: ArrayLike, view_from_world: ArrayLike, ground: Ground) -> None:
-        """Darken the caller's ground where fans and meshes keep the lights from it.
+    def draw_shadows(
+        self,
+        clip_from_view: ArrayLike,
+        view_from_world: ArrayLike,
+        ground: Ground,
+        surface: GroundSurface | None = None,
+    ) -> None:
+        """Darken the caller's ground where fans and meshes keep light from it.
 
-        Depth is tested against what is drawn already and not written. Every light that is above the ground casts.
+        Depth is tested against what is drawn already and not written. Every light that is above the ground casts, with
+        a penumbra where it has a softness, and so do the brightest lights of rooms; see `shadow_lights` and
+        `contact_shadows`.
 
         Parameters
         ----------
         clip_from_view, view_from_world : array_like, (4, 4) float
         ground : Ground
             The plane on which the caller has drawn a ground.
+        surface : GroundSurface, optional
+            What `draw_ground` has drawn: shadows fade out where it does.
         """
         check_type("ground", ground, Ground)
+        if surface is not None:
+            check_type("surface", surface, GroundSurface)
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
             fans = [batch.instances for batch in self._batches]
-            self._shadows.draw(state, fans, self._meshes, viewer, self.lights, self.ambient, ground)
+            self._shadows.draw(state, fans, self._meshes, viewer, self, ground, surface)
 
     def _buffers_in_use(self) -> dict[int, MeshBuffers]:
         levels = [batch.levels for batch in self._batches if batch.levels is not None]
         return {id(owner.buffers): owner.buffers for owner in (*self._meshes, *levels)}
 
-    def _mesh_buffers(self, model: Model) -> MeshBuffers:
-        """A model's buffers, shared by everything that draws it."""
+    def _mesh_buffers(self, model: Model, bump: Bump | None = None) -> MeshBuffers:
+        """A model's buffers, shared by everything that draws it with the same bumps."""
         for buffers in self._buffers_in_use().values():
-            if buffers.model is model:
+            if buffers.model is model and buffers.bump is bump:
                 return buffers
         with preserved_state(self._ctx):
-            return MeshBuffers(self._ctx, model)
+            return MeshBuffers(self._ctx, model, bump)
 
     @contextmanager
     def _frame(self, clip_from_view: ArrayLike, view_from_world: ArrayLike) -> Iterator[tuple[CallerState, Viewer]]:
         """The caller's state, put back at the end, and the viewer; what may have become impossible is refused."""
         self._check_in_use()
         check_lights(self._lights)
+        check_rooms(self._rooms)
         check_places(self._meshes)
         with preserved_state(self._ctx) as state:
             yield state, Viewer.from_matrices(clip_from_view, view_from_world, state.viewport)
@@ -333,7 +393,8 @@ class ImpostorRenderer:
         if output == "albedo":
             self._table.update((), 1.0)
         else:
-            self._table.update(self.lights, self.ambient)
+            self._table.update(self.lights, self.ambient, self._rooms)
+        self._room_table.update(self._rooms)
 
     @property
     def statistics(self) -> dict[str, int]:
@@ -344,6 +405,11 @@ class ImpostorRenderer:
         and mip levels lost to a full cache (`coarser`).
         """
         return {**self._impostors.statistics, **self._statistics}
+
+    @property
+    def memory(self) -> dict[str, int]:
+        """Bytes that are held on the GPU, by kind; see `runtime.memory.memory_held`."""
+        return memory_held(self)
 
     def release(self) -> None:
         """Free everything on the GPU; the context stays the caller's."""
@@ -356,7 +422,7 @@ class ImpostorRenderer:
         self._surfaces.clear()
         self._released = True
         passes = self._impostors, self._mesh_pass, self._ground_pass, self._shadows, self._surface_pass
-        for part in (*passes, self._table):
+        for part in (*passes, self._room_pass, self._table, self._room_table):
             part.release()
 
 

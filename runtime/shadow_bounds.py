@@ -9,6 +9,7 @@ from impostor.lighting import DirectionalLight
 from impostor.shadow_projection import Ground
 
 CELL = 32
+EDGE = 2
 
 
 def box_corners(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -69,8 +70,8 @@ def covered_cells(hulls: NDArray[np.float64], width: int, height: int) -> NDArra
     w = hulls[..., 3:]
     whole = (w <= 1e-9).any(axis=(1, 2))
     pixels = (hulls[..., :2] / np.where(w > 1e-9, w, 1.0) + 1) / 2 * (width, height)
-    # A pixel more on every side, for the smoothed edge.
-    low, high = pixels.min(axis=1) - 1, pixels.max(axis=1) + 1
+    # Pixels that smoothed edges reach farther.
+    low, high = pixels.min(axis=1) - EDGE, pixels.max(axis=1) + EDGE
     low[whole], high[whole] = 0, (width, height)
     last = np.array([-(-width // CELL), -(-height // CELL)])
     first = np.clip(np.floor(low / CELL), 0, last).astype(np.intp)

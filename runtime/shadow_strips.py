@@ -16,8 +16,10 @@ from impostor.views import rotation_about_y
 from runtime.gpu import InstanceBuffer, load_program, set_uniforms
 from runtime.instances import Instances, Quads, Viewer, nearest_views, quads_toward
 from runtime.shadow_bounds import box_corners
+from runtime.soft_light import point_bits, source_points, step_at_metre
 
 CASTER_DTYPE = np.dtype([("position_scale", "f4", (4,)), ("turn", "f4", (2,)), ("rows", "f4", (4, 4))])
+SOFT_DTYPE = np.dtype([*CASTER_DTYPE.descr, ("toward_light", "f4", (3,)), ("step", "f4"), ("points", "u4")])
 # Strips are cut from silhouettes whose texels are at most this large on screen.
 LARGEST_TEXEL = 1.0  # pixels
 COARSEST_SIDE = 8  # texels
@@ -80,61 +82,126 @@ class StripPass:
     def __init__(self, ctx: moderngl.Context):
         self._ctx = ctx
         self._program = load_program(ctx, "shadow_strips.vert", "shadow_strips.frag")
-        self._casters = InstanceBuffer(ctx, CASTER_DTYPE)
-        self._held: dict[tuple[int, int, int], tuple[Fan, moderngl.VertexArray | None, list[moderngl.Buffer]]] = {}
+        self._soft_program = load_program(ctx, "shadow_strips_soft.vert", "shadow_strips_soft.frag")
+        self._casters, self._soft_casters = InstanceBuffer(ctx, CASTER_DTYPE), InstanceBuffer(ctx, SOFT_DTYPE)
+        self._held: dict[tuple[int, int, int], tuple[Fan, _Strips | None]] = {}
 
     def begin(self, clip_from_world: NDArray[np.float64], light: DirectionalLight, ground: Ground) -> None:
         """Say where the fans that follow cast to."""
-        set_uniforms(
-            self._program, clip_from_world=clip_from_world, ground=tuple(ground.plane), toward_light=light.toward
-        )
+        place = {"clip_from_world": clip_from_world, "ground": tuple(ground.plane)}
+        set_uniforms(self._program, **place, toward_light=light.toward)
+        set_uniforms(self._soft_program, **place)
 
     def draw(self, fan: CastingFan, chosen: NDArray[np.intp], light: DirectionalLight, ground: Ground) -> None:
         """Draw the strips of some copies, one draw call for all that show the light the same view."""
-        toward = np.array(light.toward)
-        views, _ = nearest_views(fan.instances, np.append(toward, 0.0), fan.seen.index[chosen])
-        levels = fan.levels(1 / float(ground.normal @ toward))[chosen]
-        keys = views << 8 | levels
+        keys = _strip_keys(fan, chosen, np.array(light.toward), ground)
+        self._draw_each(fan.instances.fan, keys, fan.records[chosen], soft=False)
+
+    def draw_soft(
+        self,
+        fan: CastingFan,
+        chosen: NDArray[np.intp],
+        light: DirectionalLight,
+        ground: Ground,
+        counts: NDArray[np.intp],
+        pixels: float,
+    ) -> None:
+        """Draw the bits of some copies, each from its own number of points of the light; else as `draw`.
+
+        `pixels` is how many a metre at w = 1 takes.
+        """
+        keys, records = [], []
+        for count in np.unique(counts).tolist():
+            copies, step = chosen[counts == count], pixels * step_at_metre(light, ground, count)
+            for toward, bits in zip(source_points(light, ground, count), point_bits(count), strict=True):
+                keys.append(_strip_keys(fan, copies, toward, ground))
+                record = np.zeros(len(copies), SOFT_DTYPE)
+                for name in CASTER_DTYPE.names or ():
+                    record[name] = fan.records[name][copies]
+                record["toward_light"], record["step"], record["points"] = toward, step, bits
+                records.append(record)
+        self._draw_each(fan.instances.fan, np.concatenate(keys), np.concatenate(records), soft=True)
+
+    def _draw_each(self, fan: Fan, keys: NDArray[np.intp], records: NDArray[np.void], soft: bool) -> None:
         order = np.argsort(keys, kind="stable")
-        records = fan.records[chosen[order]]
+        records, casters = records[order], self._soft_casters if soft else self._casters
         keys, first, count = np.unique(keys[order], return_index=True, return_counts=True)
         for key, start, number in zip(keys.tolist(), first.tolist(), count.tolist(), strict=True):
-            array = self._vertex_array(fan.instances.fan, key >> 8, key & 0xFF)
-            if array is not None:
-                self._casters.write(records[start : start + number])
-                array.render(moderngl.TRIANGLES, instances=number)
+            strips = self._strips(fan, key >> 8, key & 0xFF)
+            if strips is not None:
+                casters.write(records[start : start + number])
+                strips.array(soft).render(moderngl.TRIANGLES, instances=number)
 
-    def _vertex_array(self, fan: Fan, view: int, level: int) -> moderngl.VertexArray | None:
+    def _strips(self, fan: Fan, view: int, level: int) -> _Strips | None:
         """The strips of one view, cut when first asked for, or None where its silhouette is empty."""
         key = (id(fan), view, level)
         if key not in self._held:
             silhouette, depth = _halved(fan.silhouette[view], fan.depth[view], level)
             strips = silhouette_strips(silhouette)
             triangles = strips.triangles()
-            array, buffers = None, []
+            held = None
             if len(triangles):
                 points = strip_points(strips, fan.views[view], depth)
-                buffers = [self._ctx.buffer(points.astype("f4").tobytes()), self._ctx.buffer(triangles.tobytes())]
-                names = ("position_scale", "turn", "row0", "row1", "row2", "row3")
-                layout = [(buffers[0], "3f", "point"), (self._casters.buffer, "4f 2f 4f 4f 4f 4f/i", *names)]
-                array = self._ctx.vertex_array(self._program, layout, buffers[1])
-            self._held[key] = (fan, array, buffers)
+                programs = (self._program, self._casters), (self._soft_program, self._soft_casters)
+                held = _Strips(self._ctx, programs, points, triangles)
+            self._held[key] = (fan, held)
         return self._held[key][1]
 
     def forget(self, fan: Fan) -> None:
         """Free the strips of a fan."""
         for key in [key for key, held in self._held.items() if held[0] is fan]:
-            _, array, buffers = self._held.pop(key)
-            for resource in (array, *buffers):
-                if resource is not None:
-                    resource.release()
+            strips = self._held.pop(key)[1]
+            if strips is not None:
+                strips.release()
 
     def release(self) -> None:
         """Free everything this pass made."""
         for fan in {id(held[0]): held[0] for held in self._held.values()}.values():
             self.forget(fan)
-        self._casters.release()
-        self._program.release()
+        for part in (self._casters, self._soft_casters, self._program, self._soft_program):
+            part.release()
+
+
+class _Strips:
+    """The strips of one view on the GPU, for hard lights and, once there is one, for soft lights."""
+
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        programs: tuple[tuple[moderngl.Program, InstanceBuffer], ...],
+        points: NDArray[np.float64],
+        triangles: NDArray[np.int32],
+    ):
+        self._ctx, self._programs = ctx, programs
+        self._points, self._triangles = ctx.buffer(points.astype("f4").tobytes()), ctx.buffer(triangles.tobytes())
+        self._arrays: dict[bool, moderngl.VertexArray] = {}
+
+    def array(self, soft: bool) -> moderngl.VertexArray:
+        """For one of the programs."""
+        if soft not in self._arrays:
+            program, casters = self._programs[soft]
+            names = ["position_scale", "turn", "row0", "row1", "row2", "row3"] + [
+                "toward_light",
+                "step_at_metre",
+                "points",
+            ] * soft
+            records = (casters.buffer, "4f 2f 4f 4f 4f 4f" + " 3f 1f 1u" * soft + "/i", *names)
+            layout = [(self._points, "3f", "point"), records]
+            self._arrays[soft] = self._ctx.vertex_array(program, layout, self._triangles)
+        return self._arrays[soft]
+
+    def release(self) -> None:
+        for resource in (*self._arrays.values(), self._points, self._triangles):
+            resource.release()
+
+
+def _strip_keys(
+    fan: CastingFan, chosen: NDArray[np.intp], toward: NDArray[np.float64], ground: Ground
+) -> NDArray[np.intp]:
+    """Which strips some copies cast toward a light: the nearest view in the upper bits, its level below."""
+    toward = toward / np.linalg.norm(toward)
+    views, _ = nearest_views(fan.instances, np.append(toward, 0.0), fan.seen.index[chosen])
+    return views << 8 | fan.levels(1 / float(ground.normal @ toward))[chosen]
 
 
 def _halved(

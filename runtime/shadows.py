@@ -2,32 +2,66 @@
 
 The marks are a texture of the pass's own, one light a channel, and do what a stencil would: overlapping strips mark
 a pixel once. moderngl makes no framebuffer with a stencil, so few callers have one; and all lights are marked before
-the ground is darkened, so that each takes away just the light it gave.
+the ground is darkened, so that each takes away just the light it gave. The channel of a light with a softness holds
+how much of it is hidden. Contact shadows have a channel as if they were one light more.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import moderngl
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from impostor.fan import Fan
 from impostor.lighting import DirectionalLight
-from impostor.shadow_projection import Ground, casts_shadow
+from impostor.shadow_projection import Ground
+from runtime.contact_shadows import ContactPass, ContactShadows
 from runtime.gl_state import CallerState, clear_color, set_state
 from runtime.gpu import InstanceBuffer, check_texture_size, load_program, set_uniforms
+from runtime.ground_light import BrightLights, ground_light
+from runtime.grounds import GroundSurface, metres_from_screen
 from runtime.instances import Instances, Viewer
-from runtime.meshes import MeshInstance, draw_parts
+from runtime.light_settings import LightSettings
+from runtime.meshes import MeshCopies, MeshInstance
 from runtime.relight import CORNERS
-from runtime.shadow_bounds import CELL, box_corners, covered_cells, in_view, shadow_hulls
+from runtime.shadow_bounds import CELL, covered_cells, in_view, shadow_hulls
+from runtime.shadow_meshes import MeshShadowPass, mesh_corners, most_points
 from runtime.shadow_strips import CastingFan, StripPass
+from runtime.soft_light import MOST_POINTS, penumbra_pixels, points_needed, source_rim
+from runtime.soft_shadows import Mask, SoftMarks
 
 CHANNELS = 4
 MOST_LIGHTS = 32  # that are marked together, as the shader's array has it
 CELL_DTYPE = np.dtype([("cell", "f4", (2,))])
 ZERO, SOURCE_COLOR = 0x0000, 0x0300
+
+
+class _Group(NamedTuple):
+    """Copies of a fan or of a mesh, what draws them, and where their bounding boxes are."""
+
+    draws: StripPass | MeshShadowPass
+    copies: Any
+    corners: NDArray[np.float64]
+    clip_from_shadow: NDArray[np.float64]
+    most_points: int
+
+
+class _Mark(NamedTuple):
+    """What is marked in one channel, and its part (3,) of the linear light on the ground."""
+
+    source: DirectionalLight | ContactShadows
+    share: NDArray[np.float64]
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """Equal for two whose marks are the same."""
+        if isinstance(self.source, ContactShadows):
+            return ("contact", self.source.reach)
+        soft = self.source.softness
+        return (self.source.toward, soft, float(self.share.max()) if soft else 0.0)
 
 
 class ShadowPass:
@@ -40,9 +74,9 @@ class ShadowPass:
 
     def __init__(self, ctx: moderngl.Context):
         self._ctx = ctx
-        self._strips = StripPass(ctx)
-        self._mesh_program = load_program(ctx, "shadow_mesh.vert", "shadow_mesh.frag")
+        self._strips, self._meshes, self._contacts = StripPass(ctx), MeshShadowPass(ctx), ContactPass(ctx)
         self._corners, self._cells = ctx.buffer(CORNERS), InstanceBuffer(ctx, CELL_DTYPE)
+        self._soft_marks = SoftMarks(ctx, self._corners, self._cells.buffer)
         cells = [(self._corners, "2f", "corner"), (self._cells.buffer, "2f/i", "cell")]
         names = ("shadow_darken.frag", "shadow_darken_many.frag")
         self._darken_programs = [load_program(ctx, "shadow_darken.vert", name) for name in names]
@@ -50,7 +84,7 @@ class ShadowPass:
         self._marks: moderngl.Texture | None = None
         self._target: moderngl.Framebuffer | None = None
         self._frame: tuple[object, ...] | None = None
-        self._marked_cells = 0
+        self._marked_cells, self._bright_lights = 0, BrightLights()
 
     def draw(
         self,
@@ -58,98 +92,143 @@ class ShadowPass:
         fans: Sequence[Instances],
         meshes: Sequence[MeshInstance],
         viewer: Viewer,
-        lights: Sequence[DirectionalLight],
-        ambient: ArrayLike,
+        settings: LightSettings,
         ground: Ground,
+        surface: GroundSurface | None = None,
     ) -> None:
         """Darken what lies on the ground plane in the caller's framebuffer.
 
         Depth is tested against what is drawn and not written. A viewer who is not above the ground sees no shadow.
+        Shadows fade with the surface, where there is one.
         """
         if ground.plane @ viewer.eye <= 0 or not (len(fans) or len(meshes)):
             return
-        shares = _shares(lights, ambient, ground)
-        casting = [
-            index for index, share in enumerate(shares) if casts_shadow(lights[index].toward, ground) and share.any()
-        ]
+        marks = self._marks_of(settings, viewer, ground)
         # Marks of four lights stand in each picture, pictures on top of each other in one texture.
         pictures = self._ctx.info["GL_MAX_TEXTURE_SIZE"] // (_size(viewer)[1] + 1)
         at_once = min(MOST_LIGHTS, CHANNELS * max(pictures, 1))
-        groups = [casting[start : start + at_once] for start in range(0, len(casting), at_once)]
-        frame = _frame_key(fans, meshes, viewer, [lights[index] for index in casting], ground)
+        batches = [marks[start : start + at_once] for start in range(0, len(marks), at_once)]
+        frame = _frame_key(fans, meshes, viewer, marks, ground)
         if frame != self._frame:
             self._frame = None
             casters = [CastingFan.of(instances, viewer, ground) for instances in fans]
-            for group in groups:
-                self._mark(casters, meshes, viewer, [lights[index] for index in group], ground)
-                self._darken_ground(state, viewer, ground, [shares[index] for index in group])
+            groups = self._groups(casters, MeshCopies.gathered(meshes), viewer)
+            for batch in batches:
+                self._mark(groups, viewer, batch, ground)
+                self._darken_ground(state, viewer, ground, batch, surface)
             # Where nothing has moved, the last frame's marks are this one's.
-            self._frame = frame if len(groups) == 1 else None
+            self._frame = frame if len(batches) == 1 else None
         else:
-            self._darken_ground(state, viewer, ground, [shares[index] for index in groups[0]])
+            self._darken_ground(state, viewer, ground, batches[0], surface)
 
-    def _mark(
-        self,
-        fans: Sequence[CastingFan],
-        meshes: Sequence[MeshInstance],
-        viewer: Viewer,
-        lights: Sequence[DirectionalLight],
-        ground: Ground,
-    ) -> None:
+    def _marks_of(self, settings: LightSettings, viewer: Viewer, ground: Ground) -> list[_Mark]:
+        bright = self._bright_lights.of(settings.rooms, settings.shadow_lights)
+        light = ground_light(settings.lights, settings.ambient, settings.rooms, bright, viewer, ground)
+        marks, contact = [_Mark(*caster) for caster in light.casters], settings.contact_shadows
+        if contact is not None and light.even.any():
+            marks.append(_Mark(contact, contact.strength * light.even))
+        return marks
+
+    def _groups(self, fans: Sequence[CastingFan], meshes: Sequence[MeshCopies], viewer: Viewer) -> list[_Group]:
+        clip = viewer.clip_from_world
+        return [
+            *(
+                _Group(self._strips, fan, fan.corners(), clip @ fan.records["rows"].astype(float), MOST_POINTS)
+                for fan in fans
+            ),
+            *(_Group(self._meshes, mesh, mesh_corners(mesh), clip[None], most_points(mesh)) for mesh in meshes),
+        ]
+
+    def _mark(self, groups: Sequence[_Group], viewer: Viewer, marks: Sequence[_Mark], ground: Ground) -> None:
         """Mark where each light is kept from the ground, and find the cells of the picture that hold marks."""
         width, height = _size(viewer)
-        target = self._target_for(viewer, len(lights))
+        target = self._target_for(viewer, len(marks))
         target.use()
         set_state(color_mask=(True, True, True, True))
         clear_color()
         # Marks lie on the corners of pixels, so that one bilinear fetch averages the four around a pixel's centre.
         on_corners = np.diag([width / (width + 1), height / (height + 1), 1.0, 1.0]) @ viewer.clip_from_world
-        boxes = [(fan.corners(), viewer.clip_from_world @ fan.records["rows"].astype(float)) for fan in fans]
-        mesh_boxes = [(_mesh_corners(mesh), viewer.clip_from_world[None]) for mesh in meshes]
         hulls = []
-        for index, light in enumerate(lights):
-            target.viewport = 0, index // CHANNELS * (height + 1), width + 1, height + 1
-            mask = tuple(index % CHANNELS == channel for channel in range(CHANNELS))
-            set_state(color_mask=mask)  # type: ignore[arg-type]
-            self._strips.begin(on_corners, light, ground)
-            for fan, box in zip(fans, boxes, strict=True):
-                hull = shadow_hulls(*box, light, ground)
-                chosen = np.flatnonzero(in_view(hull))
-                if len(chosen):
-                    self._strips.draw(fan, chosen, light, ground)
-                    hulls.append(hull[chosen])
-            for mesh, box in zip(meshes, mesh_boxes, strict=True):
-                hull = shadow_hulls(*box, light, ground)
-                if in_view(hull).any():
-                    self._mark_mesh(mesh, on_corners, light, ground, mask)
-                    hulls.append(hull)
+        for index, mark in enumerate(marks):
+            first_row = index // CHANNELS * (height + 1)
+            target.viewport = 0, first_row, width + 1, height + 1
+            mask = _channel_mask(index % CHANNELS)
+            set_state(color_mask=mask)
+            if isinstance(mark.source, ContactShadows):
+                hulls += self._contacts.draw(groups, on_corners, viewer, ground, mark.source)
+                continue
+            for part in (self._strips, self._meshes):
+                part.begin(on_corners, mark.source, ground)
+            if mark.source.softness:
+                hulls += self._mark_soft(groups, viewer, mark, ground, first_row, mask)
+            else:
+                hulls += self._mark_hard(groups, mark.source, ground)
+        self._marked_cells = self._write_cells(hulls, width, height)
+
+    def _mark_hard(
+        self, groups: Sequence[_Group], light: DirectionalLight, ground: Ground
+    ) -> list[NDArray[np.float64]]:
+        """Draw shadows into the bound channel; gives their hulls."""
+        hulls = []
+        for group in groups:
+            hull = shadow_hulls(group.corners, group.clip_from_shadow, light, ground)
+            chosen = np.flatnonzero(in_view(hull))
+            if len(chosen):
+                group.draws.draw(group.copies, chosen, light, ground)
+                hulls.append(hull[chosen])
+        return hulls
+
+    def _mark_soft(
+        self,
+        groups: Sequence[_Group],
+        viewer: Viewer,
+        mark: _Mark,
+        ground: Ground,
+        first_row: int,
+        channel: Mask,
+    ) -> list[NDArray[np.float64]]:
+        """Draw how much of a light is hidden into the bound channel; gives the hulls of the shadows."""
+        light, casting = mark.source, []
+        assert isinstance(light, DirectionalLight)
+        for group in groups:
+            rim = [
+                shadow_hulls(group.corners, group.clip_from_shadow, edge, ground) for edge in source_rim(light, ground)
+            ]
+            hull = np.concatenate(rim, axis=1)
+            chosen = np.flatnonzero(in_view(hull))
+            if len(chosen):
+                penumbra = penumbra_pixels(group.corners[chosen], light, ground, viewer)
+                points = points_needed(penumbra, float(mark.share.max()), group.most_points)
+                casting.append((group, chosen, points, hull[chosen]))
+        if all((points == 1).all() for _, _, points, _ in casting):
+            for group, chosen, _, _ in casting:
+                group.draws.draw(group.copies, chosen, light, ground)
+            return [hull for *_, hull in casting]
+        width, height = _size(viewer)
+        self._soft_marks.begin(width + 1, height + 1)
+        pixels = height / 2 * abs(viewer.clip_from_view[1, 1])
+        for group, chosen, points, _ in casting:
+            set_state(merge_bits=True)
+            group.draws.draw_soft(group.copies, chosen, light, ground, points, pixels)
+        assert self._target is not None
+        self._target.use()
+        hulls = [hull for *_, hull in casting]
+        count = self._write_cells(hulls, width, height)
+        squash = abs(float(viewer.view_from_world[2, :3] @ ground.normal))
+        self._soft_marks.resolve(channel, first_row, count, squash)
+        return hulls
+
+    def _write_cells(self, hulls: Sequence[NDArray[np.float64]], width: int, height: int) -> int:
+        """Upload the cells of the picture that shadows may touch; gives their number."""
         cells = [covered_cells(hull, width, height) for hull in hulls]
         found = np.unique(np.concatenate(cells), axis=0) if cells else np.zeros((0, 2))
         records = np.zeros(len(found), CELL_DTYPE)
         records["cell"] = found
         self._cells.write(records)
-        self._marked_cells = len(found)
-
-    def _mark_mesh(
-        self,
-        mesh: MeshInstance,
-        clip_from_world: NDArray[np.float64],
-        light: DirectionalLight,
-        ground: Ground,
-        mask: tuple[bool, ...],
-    ) -> None:
-        set_uniforms(
-            self._mesh_program,
-            clip_from_world=clip_from_world,
-            ground=tuple(ground.plane),
-            toward_light=light.toward,
-            world_from_model=np.asarray(mesh.world_from_model),
-        )
-        set_state(color_mask=mask)  # type: ignore[arg-type]
-        draw_parts(self._ctx, mesh.buffers, self._mesh_program, depth=False)
+        return len(found)
 
     def _darken_ground(
-        self, state: CallerState, viewer: Viewer, ground: Ground, shares: Sequence[NDArray[np.float64]]
+        self, state: CallerState, viewer: Viewer, ground: Ground, marks: Sequence[_Mark], surface: GroundSurface | None
     ) -> None:
         assert self._marks is not None
         plane = ground.plane @ np.linalg.inv(viewer.clip_from_world)
@@ -159,13 +238,15 @@ class ShadowPass:
         set_state(depth_test=True, blend=(ZERO, SOURCE_COLOR), polygon_offset=(-1.0, -4.0))
         self._marks.use(0)
         width, height = _size(viewer)
-        array, room = (self._few_lights, CHANNELS) if len(shares) <= CHANNELS else (self._many_lights, MOST_LIGHTS)
+        array, room = (self._few_lights, CHANNELS) if len(marks) <= CHANNELS else (self._many_lights, MOST_LIGHTS)
         if array is self._many_lights:
-            set_uniforms(array.program, pictures=-(-len(shares) // CHANNELS), rows=height + 1)
+            set_uniforms(array.program, pictures=-(-len(marks) // CHANNELS), rows=height + 1)
+        shares = np.array([mark.share for mark in marks])
         set_uniforms(
             array.program,
             # Depth of the ground is linear in x and y on the screen.
             ground_depth=tuple(-plane[[0, 1, 3]] / plane[2]),
+            **_fading(viewer, ground, surface),
             cell_size=(2 * CELL / width, 2 * CELL / height),
             marks=0,
             mark_origin=viewer.viewport[:2],
@@ -200,44 +281,43 @@ class ShadowPass:
         """Free what was made for a fan."""
         self._frame = None
         self._strips.forget(fan)
+        self._contacts.forget(fan)
 
     def release(self) -> None:
         """Free everything this pass made."""
         self._release_target()
-        for part in (self._strips, self._few_lights, self._many_lights, self._corners, self._cells):
+        parts = self._strips, self._meshes, self._contacts, self._soft_marks
+        for part in (*parts, self._few_lights, self._many_lights, self._corners, self._cells, *self._darken_programs):
             part.release()
-        for program in (self._mesh_program, *self._darken_programs):
-            program.release()
 
 
 def _size(viewer: Viewer) -> tuple[int, int]:
     return max(viewer.viewport[2], 1), max(viewer.viewport[3], 1)
 
 
+def _channel_mask(channel: int) -> Mask:
+    return channel == 0, channel == 1, channel == 2, channel == 3
+
+
+def _fading(viewer: Viewer, ground: Ground, surface: GroundSurface | None) -> dict[str, Any]:
+    """Uniforms of `shadow_marks.glsl`; without a surface every place is its middle."""
+    if surface is None:
+        return {"metres_from_screen": np.diag([0.0, 0.0, 1.0]), "fade": (1.0, 2.0)}
+    return {"metres_from_screen": metres_from_screen(viewer, ground, surface), "fade": surface.fade}
+
+
 def _frame_key(
     fans: Sequence[Instances],
     meshes: Sequence[MeshInstance],
     viewer: Viewer,
-    lights: Sequence[DirectionalLight],
+    marks: Sequence[_Mark],
     ground: Ground,
 ) -> tuple[object, ...]:
     """Equal for two frames that hold the same marks."""
     return (
         viewer.key,
-        tuple(light.toward for light in lights),
+        tuple(mark.key for mark in marks),
         ground.plane.tobytes(),
         *(instances.key for instances in fans),
         *((id(mesh.buffers), np.asarray(mesh.world_from_model, float).tobytes()) for mesh in meshes),
     )
-
-
-def _shares(lights: Sequence[DirectionalLight], ambient: ArrayLike, ground: Ground) -> list[NDArray[np.float64]]:
-    """Each light's part (3,) of the linear light on the ground."""
-    given = [max(float(ground.normal @ light.toward), 0.0) * np.array(light.color) for light in lights]
-    total = np.sum([np.broadcast_to(np.asarray(ambient, float), (3,)), *given], axis=0)
-    return [part / np.maximum(total, 1e-9) for part in given]
-
-
-def _mesh_corners(mesh: MeshInstance) -> NDArray[np.float64]:
-    matrix = np.asarray(mesh.world_from_model, float)
-    return (box_corners(*mesh.buffers.model.bounds) @ matrix[:3, :3].T + matrix[:3, 3])[None]

@@ -16,25 +16,26 @@ from impostor.errors import ImpostorError
 from impostor.lighting import DirectionalLight
 from impostor.model import Model
 from impostor.ptm.quantise import Ptm
-from impostor.scene import Placement, Scene, SceneGround, SceneMesh, SceneSurface, Subject, Vector
-from impostor.srgb import linear_from_srgb, srgb_from_linear
+from impostor.scene import Placement, Scene, SceneGround, SceneMesh, SceneSurface, Subject
+from impostor.srgb import srgb_from_linear
 from runtime.assets import Assets, Shelf
 from runtime.cameras import Camera
 from runtime.canvas import Canvas
 from runtime.gl_state import preserved_state
-from runtime.grounds import GroundSurface
 from runtime.instances import Instances, Viewer, quads_toward
 from runtime.lod import LevelOfDetail
 from runtime.meshes import MeshInstance
 from runtime.overdraw import OverdrawPass
 from runtime.renderer import ImpostorRenderer
+from runtime.stage_ground import GREY, ground_surface, under
+from runtime.stage_rooms import StageRooms, environments_of
 from runtime.surfaces import Surface, lying_on, rectangle
 
 VIEWS = ("lit", "albedo", "normals", "depth", "overdraw")
 ALWAYS_MESH = LevelOfDetail(mesh_above_px=0.0)
 ALWAYS_FAN = LevelOfDetail(mesh_above_px=np.inf, elevation_above_px=np.inf)
+UNSEEN = (0.0, 0.0, 0.0, 0.0)
 NEAREST = 0.1  # metres, where the scene does not say
-GREY = (0.5, 0.5, 0.5)
 
 
 @dataclass
@@ -52,8 +53,8 @@ class Copies:
         return list({id(each): each for each in (self.shown, self.fans, self.meshes) if each is not None}.values())
 
     def show(self, which: str) -> None:
-        """Make one visible: "shown", "fans" or "meshes"; what has no mesh stays a fan."""
-        chosen = getattr(self, which) or self.fans
+        """Make one visible: "shown", "fans" or "meshes", or "none"; what has no mesh stays a fan."""
+        chosen = None if which == "none" else getattr(self, which) or self.fans
         for each in self.all:
             each.visible = each is chosen
 
@@ -91,6 +92,7 @@ class Stage:
         self._assets = Assets()
         self._ground_texture: NDArray[np.uint8] | None = None
         self._lights: Sequence[DirectionalLight] = ()
+        self._rooms = StageRooms()
         self._ambient: ArrayLike = 0.0
         self._background = (*GREY, 1.0)
         self._triangle_counts: dict[Subject, int] = {}
@@ -117,6 +119,7 @@ class Stage:
         """
         texture = None if scene.ground is None or scene.ground.texture is None else scene.ground.texture
         ground_texture = None if texture is None else self._assets.picture(texture)
+        environments = environments_of(scene, self._assets)
         keys = {self._key(placement): placement for placement in scene.instances}
         exchanges: list[tuple[Shelf[Any], Mapping[Hashable, Callable[[], Any]]]] = [
             (self._copies, {key: partial(self._add_copies, placement) for key, placement in keys.items()}),
@@ -136,13 +139,20 @@ class Stage:
         for key, placement in keys.items():
             self._copies.things[key].place(placement)
         self.scene, self._ground_texture = scene, ground_texture
+        self._rooms.change(scene, environments)
         self._sphere = self._bounds()
         self._assets.forget_unused()
 
     def light(
-        self, lights: Sequence[DirectionalLight], ambient: ArrayLike, background: tuple[float, float, float]
+        self,
+        lights: Sequence[DirectionalLight],
+        ambient: ArrayLike,
+        background: tuple[float, float, float],
+        room_yaws: Sequence[float] | None = None,
     ) -> None:
-        """Set what the scene is lit by; the background is linear."""
+        """Set what the scene is lit by; the background is linear, the yaws of its rooms are radians."""
+        if room_yaws is not None:
+            self._rooms.turn(room_yaws)
         self._lights, self._ambient = lights, ambient
         red, green, blue = srgb_from_linear(np.asarray(background, float)).tolist()
         self._background = red, green, blue, 1.0
@@ -188,20 +198,58 @@ class Stage:
         # White light from everywhere shows the albedo, of a ground as of everything else.
         lit = view in ("lit", "depth")
         renderer.lights, renderer.ambient = (self._lights, self._ambient) if lit else ((), 1.0)
+        renderer.shadow_lights = self.scene.shadow_lights
+        if lit and self._rooms.uncaptured:
+            self._capture_rooms()
+        renderer.rooms = self._rooms.all if lit else ()
         self._show("shown" if split is None else "fans")
         canvas.clear(self._background if view != "normals" else (*GREY, 1.0))
-        self._lay_floor(camera)
-        renderer.draw_surfaces(*matrices, output)
-        renderer.draw_meshes(*matrices, output)
-        self._draw_ground(camera, output)
-        if lit and shadows and self.scene.ground is not None:
-            renderer.draw_shadows(*matrices, self.scene.ground.plane)
+        if lit and self._rooms.visible:
+            renderer.draw_rooms(*matrices, self._rooms.visible)
+        self._draw_beneath(camera, output, shadows and lit)
         if split is None:
             renderer.draw(*matrices, output)
             self.statistics = renderer.statistics
         else:
             self._draw_split(canvas, camera, output, round(split * canvas.size[0]))
         canvas.resolve()
+
+    def _draw_beneath(self, camera: Camera, output: str, shadows: bool) -> None:
+        """Draw what is there before the instances: surfaces, meshes, the ground and all shadows on it."""
+        renderer, matrices, ground = self.renderer, camera.matrices, self.scene.ground
+        self._lay_floor(camera)
+        renderer.draw_surfaces(*matrices, output)
+        renderer.draw_meshes(*matrices, output)
+        if ground is None:
+            return
+        background = self._background
+        if any(room.shape == "far" for room in self._rooms.visible):
+            background = UNSEEN
+        surface = ground_surface(ground, self._ground_texture, camera, background, output)
+        if ground.ptm is None:
+            renderer.draw_ground(*matrices, ground.plane, surface)
+        if shadows:
+            renderer.draw_shadows(*matrices, ground.plane, surface if ground.ptm is None else None)
+
+    def _capture_rooms(self) -> None:
+        """Take the pictures of the rooms that show the scene itself, as it is lit now, without what mirrors."""
+        renderer = self.renderer
+        renderer.rooms = self._rooms.all
+        for copies in self._copies.things.values():
+            copies.show("shown" if copies.placement.reflection is None else "none")
+        for mesh in self._meshes.things.values():
+            mesh.visible = mesh.reflection is None
+
+        def draw(clip_from_view: NDArray[np.float64], view_from_world: NDArray[np.float64]) -> None:
+            camera = Camera(clip_from_view, view_from_world)
+            self._ctx.fbo.clear(*self._background)
+            renderer.draw_rooms(*camera.matrices, self._rooms.visible)
+            self._draw_beneath(camera, "lit", True)
+            renderer.draw(*camera.matrices)
+
+        self._rooms.capture(self._ctx, draw, 2 * self._sphere[1] + 1)
+        for mesh in self._meshes.things.values():
+            mesh.visible = True
 
     def triangles_not_drawn(self, camera: Camera, size: tuple[int, int]) -> int:
         """Of all meshes whose fans are seen in a picture of `size` pixels.
@@ -251,7 +299,7 @@ class Stage:
             corners = np.append(model.bounds, np.ones((2, 1)), axis=1)
             points.append((corners @ placed.world_from_model.T)[:, :3])
             reach = max(reach, float(np.ptp(points[-1], axis=0).max()))
-        found = np.concatenate(points)
+        found = np.concatenate([*points, self._rooms.corners()])
         middle = (found.min(axis=0) + found.max(axis=0)) / 2
         return middle, float(np.linalg.norm(found - middle, axis=1).max()) + reach
 
@@ -271,26 +319,12 @@ class Stage:
         canvas.framebuffer.scissor = None  # type: ignore[assignment]
         self.statistics = {**fans, "meshes": meshes["meshes"], "triangles": meshes["triangles"]}
 
-    def _draw_ground(self, camera: Camera, output: str) -> None:
-        ground = self.scene.ground
-        if ground is None or ground.ptm is not None:
-            return
-        plane, albedo, texture = ground.plane, ground.albedo, self._ground_texture
-        middle, background = _under(ground, camera), self._background
-        if output == "normal":
-            # One colour all over; the ground knows no other output than light.
-            shown = camera.view_from_world[:3, :3] @ plane.normal / 2 + 0.5
-            red, green, blue = linear_from_srgb(shown).tolist()
-            albedo, texture, background = (red, green, blue), None, (*GREY, 1.0)
-        surface = GroundSurface(albedo, texture, ground.tile, middle, ground.reach, background)
-        self.renderer.draw_ground(*camera.matrices, plane, surface)
-
     def _lay_floor(self, camera: Camera) -> None:
         """A ground with a PTM is a surface, which goes with the eye."""
         ground = self.scene.ground
         if ground is not None:
             for floor in self._floors.things.values():
-                floor.world_from_model = lying_on(ground.plane, _under(ground, camera))
+                floor.world_from_model = lying_on(ground.plane, under(ground, camera))
 
     def _draw_overdraw(self, canvas: Canvas, camera: Camera) -> None:
         canvas.clear((0.0, 0.0, 0.0, 1.0))
@@ -304,7 +338,7 @@ class Stage:
         """Equal for placements that differ in nothing but where their copies stand."""
         subject, fan = placement.subject, self._assets.fan(placement.subject.fan)
         model = self._assets.model(subject.model, subject.up) if placement.lod and subject.model else None
-        return subject, placement.gloss, placement.lod, len(placement), id(fan), id(model)
+        return subject, placement.gloss, placement.reflection, placement.lod, len(placement), id(fan), id(model)
 
     def _add_copies(self, placement: Placement) -> Copies:
         subject = placement.subject
@@ -321,6 +355,7 @@ class Stage:
             placement.yaws,
             placement.scales,
             placement.gloss,
+            reflection=placement.reflection,
             model=model,
             level_of_detail=level_of_detail,
         )
@@ -337,7 +372,7 @@ class Stage:
         return wanted
 
     def _add_mesh(self, mesh: SceneMesh, model: Model) -> MeshInstance:
-        return self.renderer.add_mesh(model, mesh.world_from_model, mesh.gloss)
+        return self.renderer.add_mesh(model, mesh.world_from_model, mesh.gloss, reflection=mesh.reflection)
 
     def _wanted_surfaces(self, scene: Scene) -> Mapping[Hashable, Callable[[], Surface]]:
         wanted: dict[Hashable, Callable[[], Surface]] = {}
@@ -364,20 +399,6 @@ class Stage:
         """Free everything on the GPU."""
         self.renderer.release()
         self._overdraw.release()
-
-
-def _under(ground: SceneGround, camera: Camera) -> Vector:
-    """The point of the ground below the eye; where the ground has a picture, moved by less than a repeat of it.
-
-    There the ground is laid anew in every picture, so that it reaches equally far on all sides and stands still.
-    """
-    x, y, z = (-camera.view_from_world[:3, :3].T @ camera.view_from_world[:3, 3]).tolist()
-    if ground.texture is None and ground.ptm is None:
-        return x, y, z
-    lying = lying_on(ground.plane)
-    along = lying[:3, :2].T @ ((x, y, z) - lying[:3, 3])
-    x, y, z = (lying[:3, 3] + lying[:3, :2] @ (np.round(along / ground.tile) * ground.tile)).tolist()
-    return x, y, z
 
 
 def _free(taken: Mapping[Hashable, object], thing: Hashable, made_of: object) -> Hashable:

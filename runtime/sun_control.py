@@ -1,4 +1,4 @@
-"""The time of day in a walk, and a sun that can be dragged."""
+"""Time in a walk: the sun goes on and rooms turn; and both can be dragged."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ HIGHEST = np.radians(89.0)
 
 
 class SunControl:
-    """What a scene is lit by, as time goes on and the sun is dragged about.
+    """What a scene is lit by, as time goes on and sun and surroundings are dragged about.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class SunControl:
     Attributes
     ----------
     running : bool
-        Whether the time of day goes on.
+        Whether time goes on.
     """
 
     def __init__(self, scene: Scene):
@@ -39,30 +39,45 @@ class SunControl:
         self._hours = 12.0 if sun is None else sun.time_of_day
         self._north = 0.0 if sun is None else sun.north
         self._lights = self._scene.lights
-        self.running = sun is not None and sun.hours_per_second != 0
+        self._seconds, self._dragged = 0.0, 0.0
+        self.running = (sun is not None and sun.hours_per_second != 0) or self._rooms_turn
 
     def change(self, scene: Scene, parts: frozenset[str]) -> None:
         """Go on in another scene, which differs in some parts: from its beginning where its light is another."""
         self._scene = scene
-        if parts & {"sun", "lights"}:
+        if parts & {"sun", "lights", "rooms"}:
             self.reset()
 
     @property
     def has_time(self) -> bool:
-        """Whether there is a sun, which has a time of day."""
-        return self._scene.sun is not None
+        """Whether there is anything that goes with time: a sun, or a room that turns."""
+        return self._scene.sun is not None or self._rooms_turn
+
+    @property
+    def _rooms_turn(self) -> bool:
+        return any(room.turn != 0 for room in self._scene.rooms)
+
+    @property
+    def room_yaws(self) -> tuple[float, ...]:
+        """How the scene's rooms are turned, radians."""
+        return tuple(
+            room.yaw + room.turn * self._seconds + (self._dragged if room.shape == "far" else 0.0)
+            for room in self._scene.rooms
+        )
 
     def step(self, seconds: float) -> None:
         """Let time go on, if it does."""
-        if self.running and self._scene.sun is not None:
-            self.turn_clock(seconds * (self._scene.sun.hours_per_second or USUAL_RATE))
+        if self.running:
+            self._seconds += seconds
+            if self._scene.sun is not None:
+                self.turn_clock(seconds * (self._scene.sun.hours_per_second or USUAL_RATE))
 
     def turn_clock(self, hours: float) -> None:
         """Move the sun along its own way."""
         self._hours = (self._hours + hours) % 24.0
 
     def drag(self, right: float, up: float) -> None:
-        """Pull the sun, or where there is none the first light, sideways and up.
+        """Pull the sun, or where there is none the first light, sideways and up; far rooms turn sideways with it.
 
         The sun rises as the day does, to noon and no further; sideways its whole way turns.
 
@@ -71,6 +86,7 @@ class SunControl:
         right, up : float
             Radians.
         """
+        self._dragged -= right
         if self._scene.sun is not None:
             self._north -= right
             afternoon = self._hours >= 12

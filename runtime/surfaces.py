@@ -9,6 +9,7 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from impostor.environment.room import Room
 from impostor.errors import SettingsError
 from impostor.lighting import DirectionalLight, Gloss
 from impostor.model import Model
@@ -21,6 +22,7 @@ from runtime.gpu import load_program, set_uniforms
 from runtime.instances import Viewer
 from runtime.meshes import OUTPUTS
 from runtime.relit_surfaces import MOST_TERMS, RelitPicture, RelitPictures, bind_terms, packed_terms
+from runtime.room_lights import RoomLights
 from runtime.surface_buffers import Light, SurfaceBuffers, bind_lights, lights_at
 from runtime.surface_textures import KINDS, PtmTextures
 
@@ -129,6 +131,7 @@ class SurfacePass:
         self._relit = RelitPictures(ctx)
         self._textures: dict[int, PtmTextures] = {}
         self._buffers: dict[int, SurfaceBuffers] = {}
+        self._room_lights = RoomLights()
         self.statistics: dict[str, int] = {}
 
     def prepare(self, surfaces: Sequence[Surface]) -> None:
@@ -160,6 +163,7 @@ class SurfacePass:
         lights: Sequence[Light],
         ambient: ArrayLike = 0.0,
         output: str = "lit",
+        rooms: Sequence[Room] = (),
     ) -> None:
         """Draw surfaces.
 
@@ -173,6 +177,8 @@ class SurfacePass:
         ambient : array_like, () or (3,) float
         output : {"lit", "albedo", "normal"}
             Albedo is the picture under white ambient light. Normals are the PTM's, in view space, n / 2 + 1/2.
+        rooms : sequence of Room
+            They light each surface as a few lights do, the same all over it.
 
         Raises
         ------
@@ -182,26 +188,28 @@ class SurfacePass:
         if output not in OUTPUTS:
             raise SettingsError("output", f"{output!r}; expected one of {', '.join(OUTPUTS)}")
         if output != "lit":
-            lights, ambient = (), 1.0
+            lights, ambient, rooms = (), 1.0, ()
         self.prepare(surfaces)
+        self._room_lights.keep(rooms)
         spheres = [_sphere(surface) for surface in surfaces]
-        seen = [
-            each
+        seen = {
+            each: [*lights, *self._room_lights.at(rooms, at)]
             for each, (at, reach) in zip(surfaces, spheres, strict=True)
             if viewer.sees(at[None], np.array([reach]))[0]
-        ]
-        flat = {surface: self._terms(surface, lights, ambient) for surface in seen} if output != "normal" else {}
+        }
+        shaded = {} if output == "normal" else seen
+        flat = {surface: self._terms(surface, lit_by, ambient) for surface, lit_by in shaded.items()}
         pictures = self._pictures(flat) if output == "lit" else {}
         state.bind_target()
         set_state(depth_test=True, depth_write=True)
-        for surface in seen:
+        for surface, lit_by in seen.items():
             picture, terms = pictures.get(surface), flat.get(surface)
             if picture is not None:
                 program = self._bind_plain(surface, picture)
             elif terms is not None:
                 program = self._bind_flat(surface, terms)
             else:
-                program = self._bind_lit(surface, viewer, lights, ambient, output == "normal")
+                program = self._bind_lit(surface, viewer, lit_by, ambient, output == "normal")
             self._draw_mesh(program, surface, viewer)
         self.statistics = {"surfaces": len(seen), "plain": len(pictures), "relit": self._relit.made}
 

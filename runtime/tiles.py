@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from impostor.environment.room import Room
 from runtime.gpu import check_texture_size
+
+# Copies in one cube of this part of the smallest room's smallest side share tiles: they are at most 1.4 % of it apart.
+CELL = 1 / 128
+VIEW_BITS, LEVEL_BITS = 11, 4
 
 
 class CacheFull(Exception):
@@ -126,9 +133,86 @@ class TileIndex:
 
     def add(self, keys: NDArray[np.int64], places: NDArray[np.int32]) -> None:
         """Take in tiles (N,) that are not there yet and their places (N, 3)."""
-        known = np.concatenate([self._keys, keys])
-        entries = np.concatenate([self._entries, np.arange(len(self.places), len(known))])
-        order = np.argsort(known)
-        self._keys, self._entries = known[order], entries[order]
+        order = np.argsort(keys)
+        entries = np.arange(len(self.places), len(self.places) + len(keys))
+        at = np.searchsorted(self._keys, keys[order])
+        self._keys = np.insert(self._keys, at, keys[order])
+        self._entries = np.insert(self._entries, at, entries[order])
         self.places = np.concatenate([self.places, places])
         self.versions = np.concatenate([self.versions, np.full(len(keys), -1)])
+
+
+class LastTiles:
+    """The tiles that copies of a fan showed last: from frame to frame few copies show another one.
+
+    Parameters
+    ----------
+    index : TileIndex
+    count : int
+        Of copies.
+    """
+
+    def __init__(self, index: TileIndex, count: int):
+        self.index = index
+        self._keys, self._entries = np.full(count, -1, np.int64), np.zeros(count, np.intp)
+
+    def __len__(self) -> int:
+        return len(self._keys)
+
+    def changed(self, copies: NDArray[np.intp], keys: NDArray[np.int64]) -> NDArray[np.intp]:
+        """Which of some copies, given by the keys (N,) of their tiles, do not show the tile that they showed last."""
+        return np.flatnonzero(self._keys.take(copies) != keys)
+
+    def remember(self, copies: NDArray[np.intp], keys: NDArray[np.int64], entries: NDArray[np.intp]) -> None:
+        """Take over the tiles of copies that show others than before."""
+        self._keys[copies], self._entries[copies] = keys, entries
+
+    def entries(self, copies: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Where the tiles of copies stand in the index."""
+        return self._entries.take(copies)
+
+
+class CellIndex:
+    """Numbers the cubes of space in which copies of a fan share tiles.
+
+    Attributes
+    ----------
+    side : float
+        Of a cube, metres.
+    """
+
+    def __init__(self):
+        self.side = 1.0
+        self._known = TileIndex()
+
+    def numbers(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Of the cubes that points (N, 3) of the world lie in, (N,)."""
+        cells = np.floor(points / self.side).astype(np.int64) & 0x1FFFFF
+        keys = cells[:, 0] << 42 | cells[:, 1] << 21 | cells[:, 2]
+        fresh = np.unique(keys[self._known.find(keys) < 0])
+        self._known.add(fresh, np.zeros((len(fresh), 3), np.int32))
+        return self._known.find(keys).astype(np.int64)
+
+    def clear(self) -> None:
+        """Forget them all."""
+        self._known = TileIndex()
+
+
+def shared_side(rooms: Sequence[Room]) -> float:
+    """Side of the cubes in which copies may share tiles, in metres; infinite where all rooms are far."""
+    sides = [np.linalg.norm(np.asarray(room.world_from_room)[:3, :3], axis=0).min() for room in rooms]
+    near = [2 * CELL * float(side) for side, room in zip(sides, rooms, strict=True) if room.shape != "far"]
+    return min(near, default=np.inf)
+
+
+def tile_keys(
+    yaws: NDArray[np.float64], views: NDArray[np.intp], levels: NDArray[np.intp], cells: NDArray[np.int64] | int
+) -> NDArray[np.int64]:
+    """Numbers (N,) of tiles that look different; beyond 131,072 cells, some share them."""
+    keys = np.asarray(cells, np.int64) << 32 | yaws.astype(np.float32).view(np.uint32)
+    return (keys << VIEW_BITS | views) << LEVEL_BITS | levels
+
+
+def key_levels(keys: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The levels (N,) that `tile_keys` was given."""
+    return keys & (1 << LEVEL_BITS) - 1

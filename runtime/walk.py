@@ -18,6 +18,7 @@ from runtime.cameras import Camera
 from runtime.canvas import Canvas
 from runtime.draw_calls import counted_draw_calls
 from runtime.frame_statistics import FrameStatistics
+from runtime.memory import memory_held
 from runtime.overlay import LEADING, Overlay, Panel, Row
 from runtime.scene_changes import Change, SceneChanges
 from runtime.stage import VIEWS, Stage
@@ -187,7 +188,7 @@ class Walk:
     def _toggle_time(self) -> None:
         self.sun.running = not self.sun.running
         goes = "goes on" if self.sun.running else "stands still"
-        self.say(f"time {goes}" if self.sun.has_time else "this scene has no sun")
+        self.say(f"time {goes}" if self.sun.has_time else "nothing in this scene goes with time")
 
     def _toggle_split(self) -> None:
         try:
@@ -262,7 +263,7 @@ class Walk:
     def draw(self) -> None:
         """Draw the picture, without what lies over it."""
         begun, shown, camera, lighting = time.perf_counter(), self.shown, self.camera, self.sun.lighting
-        self.stage.light(lighting.lights, lighting.ambient, lighting.background)
+        self.stage.light(lighting.lights, lighting.ambient, lighting.background, self.sun.room_yaws)
         with counted_draw_calls() as calls:
             self.stage.draw(self.canvas, camera, shown.view, shown.shadows, shown.split)
         if shown.view == "depth":
@@ -318,6 +319,7 @@ class Walk:
             self._rows = (
                 *self.statistics.rows(),
                 *(("not drawn", each) for each in spared),
+                ("GPU memory", f"{sum(self.memory.values()) / 2**20:,.0f} MiB"),
                 ("sun", self.sun.words),
                 ("eye", f"{eye} m, {'flying' if self.walker.flying else 'walking'}"),
                 ("view", self.shown.view),
@@ -328,6 +330,11 @@ class Walk:
     def triangles_not_drawn(self) -> int:
         """Of the meshes whose fans are seen in the last picture."""
         return self.stage.triangles_not_drawn(self.camera, self.canvas.size)
+
+    @property
+    def memory(self) -> dict[str, int]:
+        """Bytes that the walk holds on the GPU, by kind; see `memory_held`."""
+        return memory_held(self)
 
     def release(self) -> None:
         """Free everything on the GPU, and stop what is being baked."""

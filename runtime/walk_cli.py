@@ -249,6 +249,7 @@ def _summary(walk: Walk) -> dict[str, Any]:
         "size": list(walk.canvas.size),
         **walk.statistics.summary(),
         "triangles_not_drawn": walk.triangles_not_drawn,
+        "memory_bytes": walk.memory,
     }
 
 

@@ -85,10 +85,14 @@ def padded(faces: NDArray[np.floating]) -> NDArray[np.floating]:
     """A cube map with a border of its neighbours' texels around every face, (6, N + 2, N + 2, C)."""
     size = faces.shape[1]
     across = (np.arange(-1, size + 1) + 0.5) * (2 / size) - 1
-    # A texel beyond the edge is its neighbour's nearest; one beyond a corner, which there is none of, is the corner's.
     number, places = faces_of(_directions(across))
     column, row = np.clip(np.floor((places + 1) * (size / 2)).astype(np.intp), 0, size - 1).transpose(3, 0, 1, 2)
-    return faces[number, row, column]
+    out = faces[number, row, column]
+    # There is no texel beyond a corner: the mean of the three that meet there makes all faces agree on it.
+    for end, inner in ((0, 1), (-1, -2)):
+        for side, within in ((0, 1), (-1, -2)):
+            out[:, end, side] = (out[:, inner, within] + out[:, inner, side] + out[:, end, within]) / 3
+    return out
 
 
 def sample_padded(faces: NDArray[np.floating], directions: ArrayLike) -> NDArray[np.floating]:
@@ -101,6 +105,39 @@ def sample_padded(faces: NDArray[np.floating], directions: ArrayLike) -> NDArray
     upper = faces[number, row, column] * (1 - right) + faces[number, row, column + 1] * right
     lower = faces[number, row + 1, column] * (1 - right) + faces[number, row + 1, column + 1] * right
     return upper * (1 - down) + lower * down
+
+
+def reduced(faces: NDArray[np.floating], size: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """A cube map of fewer texels that keeps its light and where it comes from.
+
+    Parameters
+    ----------
+    faces : ndarray, (6, N, N, 3) float
+    size : int
+        Divides N.
+
+    Returns
+    -------
+    light : ndarray, (6, size, size, 3) float64
+        Radiance times solid angle.
+    toward : ndarray, (6, size, size, 3) float64
+        Unit vectors: mean directions weighted by light, so that a sun stays where it is.
+    """
+    many = faces.shape[1] // size
+    light, toward = np.empty((2, 6, size, size, 3))
+    for face, directions in enumerate(face_directions(faces.shape[1])):
+        part = faces[face] * solid_angles(faces.shape[1])[..., None]
+        light[face] = _block_sums(part, many)
+        # A little light everywhere, so that black has a direction too.
+        weight = part.sum(axis=-1, keepdims=True) + 1e-30
+        toward[face] = _block_sums(weight * directions, many)
+    return light, toward / np.linalg.norm(toward, axis=-1, keepdims=True)
+
+
+def _block_sums(image: NDArray[np.floating], many: int) -> NDArray[np.floating]:
+    """Of (N, N, C) over squares of `many` texels a side."""
+    size = image.shape[0] // many
+    return image.reshape(size, many, size, many, -1).sum(axis=(1, 3))
 
 
 def _directions(across: NDArray[np.floating]) -> NDArray[np.float64]:

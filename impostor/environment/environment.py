@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from impostor.environment.cube import sample
+from impostor.environment.cube import padded, sample_padded
+from impostor.environment.diffuse import diffuse_faces
+from impostor.environment.prefilter import prefiltered
 from impostor.errors import SettingsError
 
 MIN_FACE, MAX_FACE = 8, 4096
@@ -34,7 +37,7 @@ class Environment:
     faces: NDArray[np.float32]
 
     def __post_init__(self):
-        faces = np.ascontiguousarray(self.faces, np.float32)
+        faces = np.array(self.faces, np.float32, order="C")
         size = faces.shape[1] if faces.ndim == 4 else 0
         if faces.shape != (6, size, size, 3) or not MIN_FACE <= size <= MAX_FACE or size & (size - 1):
             wanted = f"(6, N, N, 3), N a power of two from {MIN_FACE} to {MAX_FACE}"
@@ -51,4 +54,49 @@ class Environment:
 
     def radiance(self, directions: ArrayLike) -> NDArray[np.float32]:
         """Light from some directions (..., 3) of any length, (..., 3) float32; bilinear."""
-        return sample(self.faces, directions)
+        return sample_padded(self._padded, directions)
+
+    @cached_property
+    def diffuse(self) -> NDArray[np.float32]:
+        """Cosine-weighted mean radiance around every normal: irradiance / pi, (6, 32, 32, 3) float32."""
+        return diffuse_faces(self.faces)
+
+    @cached_property
+    def levels(self) -> tuple[NDArray[np.float32], ...]:
+        """What surfaces of roughness k / (K - 1) mirror, each (6, n_k, n_k, 3) float32, n_k = size >> k down to 8."""
+        return prefiltered(self.faces)
+
+    def mirrored(self, directions: ArrayLike, roughness: ArrayLike) -> NDArray[np.float32]:
+        """Radiance as surfaces of some roughness mirror it: bilinear in `levels`, linear between them.
+
+        Parameters
+        ----------
+        directions : array_like, (..., 3) float
+            Of any length but 0.
+        roughness : array_like, (...) float
+            0 to 1.
+
+        Returns
+        -------
+        ndarray, (..., 3) float32
+        """
+        roughness = np.clip(np.asarray(roughness, np.float32), 0, 1)[..., None]
+        if not roughness.any():
+            return self.radiance(
+                np.broadcast_to(directions, np.broadcast_shapes(np.shape(directions), roughness.shape))
+            )
+        height = roughness * (len(self.levels) - 1)
+        out = np.float32(0)
+        for number, faces in enumerate(self._padded_levels):
+            weight = np.maximum(1 - np.abs(height - number), 0)
+            if weight.any():
+                out = out + weight * sample_padded(faces, directions)
+        return np.asarray(out)
+
+    @cached_property
+    def _padded(self) -> NDArray[np.float32]:
+        return padded(self.faces)
+
+    @cached_property
+    def _padded_levels(self) -> tuple[NDArray[np.float32], ...]:
+        return self._padded, *(padded(level) for level in self.levels[1:])

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from impostor.environment.cube import face_directions, solid_angles
+from impostor.environment.environment import Environment
 from impostor.environment.room import Room
 from impostor.errors import SettingsError
 from impostor.lighting import DirectionalLight
@@ -14,23 +17,22 @@ FINEST = 64  # texels along a face: finer ones are put together first
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
-def light_cut(room: Room, count: int) -> list[DirectionalLight]:
-    """Lights that stand for all that a room shines with.
+def light_cut(environment: Environment, count: int) -> list[DirectionalLight]:
+    """Lights that stand for all that an environment shines with.
 
     The sphere is halved again and again so that both halves are equally bright; every part becomes one light, which
     stands where the part's light comes from on average.
 
     Parameters
     ----------
-    room : Room
-        Taken as far away.
+    environment : Environment
     count : int
-        At least 1. A room whose light comes from fewer texels gives fewer lights, a dark one none.
+        At least 1. An environment whose light comes from fewer texels gives fewer lights, a dark one none.
 
     Returns
     -------
     list of DirectionalLight
-        World space, brightest first; together they hold all of the room's light.
+        In the environment's axes, brightest first; together they hold all of its light.
 
     Raises
     ------
@@ -43,7 +45,7 @@ def light_cut(room: Room, count: int) -> list[DirectionalLight]:
     """
     if count < 1:
         raise SettingsError("light cut", f"{count} lights; expected at least 1")
-    directions, power = _texels(room)
+    directions, power = _texels(environment)
     parts = [np.flatnonzero(power @ LUMINANCE > 0)]
     while len(parts) < count:
         brightness = [_brightness(power[part]) if len(part) > 1 else 0.0 for part in parts]
@@ -54,18 +56,30 @@ def light_cut(room: Room, count: int) -> list[DirectionalLight]:
     return sorted(lights, key=lambda light: -float(LUMINANCE @ light.color))
 
 
-def _texels(room: Room) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where in the world the texels are that shine, (K, 3), and with what irradiance on what faces them, (K, 3)."""
-    faces, size = room.environment.faces, room.environment.size
+def in_world(lights: Sequence[DirectionalLight], room: Room, share: float = 1.0) -> list[DirectionalLight]:
+    """Lights of a room's environment as the room turns and exposes them, `share` of their light."""
+    if not lights:
+        return []
+    toward = np.array([light.toward for light in lights]) @ room.environment_from_world
+    color = np.array([light.color for light in lights]) * (room.exposure * share)
+    return [
+        DirectionalLight((x, y, z), (red, green, blue), light.softness)
+        for (x, y, z), (red, green, blue), light in zip(toward.tolist(), color.tolist(), lights, strict=True)
+    ]
+
+
+def _texels(environment: Environment) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where the texels are that shine, (K, 3), and with what irradiance / pi on what faces them, (K, 3)."""
+    faces, size = environment.faces, environment.size
     power = faces.astype(np.float64) * solid_angles(size)[..., None]
     # What a coarse texel shines comes from where the fine ones in it are bright.
     moments = (power @ LUMINANCE)[..., None] * face_directions(size)
     if size > FINEST:
         split = (6, FINEST, size // FINEST, FINEST, size // FINEST, 3)
         power, moments = (each.reshape(split).sum(axis=(2, 4)) for each in (power, moments))
-    power, moments = power.reshape(-1, 3) * (room.exposure / np.pi), moments.reshape(-1, 3)
+    power, moments = power.reshape(-1, 3) / np.pi, moments.reshape(-1, 3)
     lengths = np.linalg.norm(moments, axis=-1, keepdims=True)
-    return moments / np.maximum(lengths, 1e-30) @ room.environment_from_world, power
+    return moments / np.maximum(lengths, 1e-30), power
 
 
 def _brightness(power: NDArray[np.float64]) -> float:

@@ -14,6 +14,8 @@ from impostor.errors import SettingsError
 from impostor.views import rotation_about_y
 
 SHAPES = ("far", "sphere", "box")
+WALL = 1e-4
+"""Part of the half size by which a point may lie beyond a wall and still be inside: rounding puts some there."""
 Vector = tuple[float, float, float]
 
 
@@ -44,7 +46,8 @@ class Room:
     Raises
     ------
     SettingsError
-        A number that is not finite; a matrix without an inverse, that mirrors, or whose axes are not at right angles.
+        A number that is not finite; a matrix without an inverse, that mirrors, or whose axes are not at right angles;
+        a place of capture that is outside.
 
     References
     ----------
@@ -73,12 +76,16 @@ class Room:
             raise SettingsError("room", "world_from_room has axes that are not at right angles")
         if not 0 <= self.exposure < np.inf:
             raise SettingsError("room", f"exposure {self.exposure}; expected a number of at least 0")
+        outside = np.asarray(self.outside, np.float64)
+        if outside.shape != (3,) or not np.isfinite(outside).all() or outside.min() < 0:
+            raise SettingsError("room", f"outside {self.outside}; expected three finite numbers, none negative")
         captured = np.asarray(self.captured_at, np.float64)
         if captured.shape != (3,) or not np.isfinite(captured).all() or not self._within(captured):
             raise SettingsError("room", f"captured_at {self.captured_at}; expected a point inside, in room space")
         matrix.flags.writeable = False
         object.__setattr__(self, "world_from_room", matrix)
         object.__setattr__(self, "captured_at", tuple(captured.tolist()))
+        object.__setattr__(self, "outside", tuple(outside.tolist()))
 
     @classmethod
     def far(cls, environment: Environment, yaw: float = 0.0, exposure: float = 1.0) -> Room:
@@ -131,12 +138,15 @@ class Room:
     def key(self) -> Hashable:
         """Equal for rooms that light and mirror alike."""
         matrix = np.asarray(self.world_from_room).tobytes()
-        return id(self.environment), self.shape, matrix, self.captured_at, self.exposure, self.stretched, self.outside
+        return self.environment, self.shape, matrix, self.captured_at, self.exposure, self.stretched, self.outside
 
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Whether points of the world (..., 3) lie inside, (...) bool; all do where the room is far."""
-        linear, origin = self.room_from_world[:3, :3], self.room_from_world[:3, 3]
-        return self._within(np.asarray(points, np.float64) @ linear.T + origin)
+        """Whether points of the world (..., 3) lie inside, walls included, (...) bool; all do where the room is far."""
+        return self._within(self.in_room(points))
+
+    def in_room(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Points of the world (..., 3) in room space, (..., 3) float64."""
+        return np.asarray(points, np.float64) @ self.room_from_world[:3, :3].T + self.room_from_world[:3, 3]
 
     def directions_toward(
         self, points: ArrayLike, directions: ArrayLike
@@ -159,43 +169,41 @@ class Room:
         ----------
         GPU Gems 19, listing 19-2; the box is met by its nearest slab.
         """
-        directions = np.asarray(directions, np.float64)
+        points, directions = np.asarray(points, np.float64), np.asarray(directions, np.float64)
+        points, directions = np.broadcast_arrays(points, directions)
         if self.shape == "far":
-            toward = directions @ self.environment_from_world.T
-            return toward, np.ones(toward.shape[:-1], bool)
-        linear, origin = self.room_from_world[:3, :3], self.room_from_world[:3, 3]
-        start = np.asarray(points, np.float64) @ linear.T + origin
-        along = directions @ linear.T
-        start, along = np.broadcast_arrays(start, along / np.linalg.norm(along, axis=-1, keepdims=True))
+            return directions @ self.environment_from_world.T, np.ones(directions.shape[:-1], bool)
+        start, along = self.in_room(points), directions @ self.room_from_world[:3, :3].T
+        along = along / np.linalg.norm(along, axis=-1, keepdims=True)
         inside = self._within(start)
         start = np.where(inside[..., None], start, 0)
-        reach = _to_sphere(start, along) if self.shape == "sphere" else _to_box(start, along)
-        met = start + reach[..., None] * along - self.captured_at
+        met = start + (_to_sphere if self.shape == "sphere" else _to_box)(start, along)[..., None] * along
+        toward = met - self.captured_at
         # A camera on the wall itself sees nothing of the point it touches.
-        met = np.where(np.abs(met).max(axis=-1, keepdims=True) > 1e-9, met, along)
-        return met @ self.environment_from_room.T, inside
+        toward = np.where(np.abs(toward).max(axis=-1, keepdims=True) > 1e-9, toward, along)
+        return toward @ self.environment_from_room.T, inside
 
     def _within(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether points in room space lie inside, walls included."""
         if self.shape == "far":
             return np.ones(points.shape[:-1], bool)
         if self.shape == "sphere":
-            return np.square(points).sum(axis=-1) <= 1
-        return np.abs(points).max(axis=-1) <= 1
+            return np.linalg.norm(points, axis=-1) <= 1 + WALL
+        return np.abs(points).max(axis=-1) <= 1 + WALL
 
 
 def _to_sphere(start: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
     """Distance from points inside to the unit sphere along unit vectors: the quadratic of listing 19-2."""
     half_b = (start * along).sum(axis=-1)
     c = np.square(start).sum(axis=-1) - 1
-    return -half_b + np.sqrt(np.maximum(half_b**2 - c, 0))
+    return np.maximum(np.sqrt(np.maximum(half_b**2 - c, 0)) - half_b, 0)
 
 
 def _to_box(start: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
     """Distance from points inside to the cube from -1 to 1 along unit vectors."""
     parallel = np.abs(along) < 1e-12
     reach = (np.sign(along) - start) / np.where(parallel, 1, along)
-    return np.where(parallel, np.inf, reach).min(axis=-1)
+    return np.maximum(np.where(parallel, np.inf, reach).min(axis=-1), 0)
 
 
 def _placed(half_sizes: ArrayLike, position: ArrayLike, yaw: float) -> NDArray[np.float64]:

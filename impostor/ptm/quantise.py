@@ -13,6 +13,7 @@ from impostor.ptm.polynomials import TERMS, Curve, Parameters, Polynomials, chec
 
 WHITE = 255
 LARGEST_SCALE = 1e30  # Times 255 still a finite float32.
+BAND = 32  # rows, measured
 SMALLEST_RANGE = 1e-6  # Of 255: what a viewer that reads its scales as "%f" takes for no range at all.
 
 
@@ -120,10 +121,7 @@ def quantise(polynomials: Polynomials, scale: ArrayLike | None = None, bias: Arr
     if scale is None or bias is None:
         scale, bias = scale_and_bias(coefficients)
     scale, bias = np.asarray(scale, np.float64), np.asarray(bias, np.int64)
-    steps = np.divide(WHITE, scale, out=np.zeros(TERMS), where=scale > 0)
-    levels = np.empty(coefficients.shape, np.uint8)
-    for term in range(TERMS):
-        levels[..., term] = _byte(coefficients[..., term] * float(steps[term]) + float(bias[term]))
+    levels = _levels(coefficients, scale, bias)
     color, chroma = (None if array is None else _byte(array * WHITE) for array in (color, chroma))
     return Ptm(levels, scale, bias, color, chroma, matrix, polynomials.curve, polynomials.parameters)
 
@@ -149,6 +147,20 @@ def scale_and_bias(coefficients: NDArray[np.floating]) -> tuple[NDArray[np.float
     flat = highest - lowest < SMALLEST_RANGE
     scale = np.array([float(f"{value:.7g}") for value in np.where(flat, 1, (highest - lowest) / WHITE)])
     return scale, np.clip(np.rint(-lowest / scale), 0, WHITE).astype(np.int64)
+
+
+def _levels(
+    coefficients: NDArray[np.float32], scale: NDArray[np.float64], bias: NDArray[np.int64]
+) -> NDArray[np.uint8]:
+    """Coefficients in steps, a band of rows at a time: it stays in the cache while its planes are interleaved."""
+    steps = np.divide(WHITE, scale, out=np.zeros(TERMS), where=scale > 0)
+    levels = np.empty(coefficients.shape, np.uint8)
+    for top in range(0, len(levels), BAND):
+        band = slice(top, top + BAND)
+        for channel, term in np.ndindex(coefficients.shape[2:]):
+            exact = coefficients[band, :, channel, term] * float(steps[term]) + float(bias[term])
+            levels[band, :, channel, term] = _byte(exact)
+    return levels
 
 
 def _within_bytes(

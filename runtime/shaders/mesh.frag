@@ -6,5 +6,6 @@
 
 void main() {
     if (cut_out(v_uv, v_tint.a)) discard;
-    color = mesh_color();
+    vec3 toward_eye = toward_the_eye();
+    color = mesh_color(seen_normal(v_normal, toward_eye), toward_eye, vec3(0.0), vec3(0.0), 0.0);
 }

@@ -7,8 +7,11 @@ in vec2 uv;
 in vec4 tint;  // sRGB curve, as stored
 in vec4 row_0, row_1, row_2;  // of the copy's world_from_model
 in float fan_share;           // of the pixels, in a crossfade
+in vec4 tangent;              // w: -1 where the picture is mirrored
 out vec3 v_world;
 out vec3 v_normal;
+out vec3 v_tangent;
+flat out float v_mirrored;
 out vec2 v_uv;
 out vec4 v_tint;
 flat out float v_fan_share;
@@ -18,6 +21,8 @@ void main() {
     v_world = vec3(dot(row_0, point), dot(row_1, point), dot(row_2, point));
     gl_Position = clip_from_world * vec4(v_world, 1.0);
     v_normal = vec3(dot(row_0.xyz, normal), dot(row_1.xyz, normal), dot(row_2.xyz, normal));
+    v_tangent = vec3(dot(row_0.xyz, tangent.xyz), dot(row_1.xyz, tangent.xyz), dot(row_2.xyz, tangent.xyz));
+    v_mirrored = tangent.w;
     v_uv = uv;
     v_tint = vec4(mix(tint.rgb / 12.92, pow((tint.rgb + 0.055) / 1.055, vec3(2.4)), step(0.04045, tint.rgb)), tint.a);
     v_fan_share = fan_share;

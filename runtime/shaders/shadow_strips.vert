@@ -1,5 +1,6 @@
 #version 330
 // Steps 2 to 5 of the strip shadow; equals impostor.shadow_projection.shadow_on_ground.
+#include "shadow_casting.glsl"
 uniform mat4 clip_from_world;
 uniform vec4 ground;        // plane: dot with a homogeneous point is its height
 uniform vec3 toward_light;  // unit
@@ -9,10 +10,6 @@ in vec2 turn;               // cosine and sine of its yaw
 in vec4 row0, row1, row2, row3;  // steps 3 to 5 in one matrix, world space to homogeneous world space
 
 void main() {
-    vec3 turned = vec3(turn.x * point.x + turn.y * point.z, point.y, turn.x * point.z - turn.y * point.x);
-    vec3 world = position_scale.xyz + position_scale.w * turned;
-    float height = dot(ground, vec4(world, 1.0));
-    world -= max(height, 0.0) * toward_light / dot(ground.xyz, toward_light) + min(height, 0.0) * ground.xyz;
-    vec4 p = vec4(world, 1.0);
+    vec4 p = vec4(on_ground(placed(point, position_scale, turn), ground, toward_light), 1.0);
     gl_Position = clip_from_world * vec4(dot(row0, p), dot(row1, p), dot(row2, p), dot(row3, p));
 }

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from impostor.lighting import DirectionalLight
-from impostor.scene import Scene, SceneCamera, Sun
+from impostor.scene import Scene, SceneCamera, SceneRoom, Sun
 from runtime.sun_control import USUAL_RATE, SunControl
 
 CAMERA = SceneCamera((0, 1, 5), (0, 1, 0))
@@ -70,3 +70,14 @@ def test_a_changed_scene_keeps_the_time_unless_its_light_is_another():
     assert control.words.startswith("12:00")
     control.change(replace(SUNNY, sun=Sun(17.0)), frozenset({"sun"}))
     assert control.words.startswith("17:00")
+
+
+def test_rooms_turn_with_time_and_far_ones_are_dragged_with_the_sun():
+    far, box = SceneRoom(Path("a.hdr"), turn=0.5), SceneRoom(Path("b.hdr"), "box", yaw=0.1)
+    control = SunControl(replace(SUNNY, rooms=(far, box)))
+    assert control.running and control.has_time
+    control.step(2.0)
+    control.drag(0.3, 0.0)
+    assert control.room_yaws == pytest.approx((0.7, 0.1))
+    control.change(replace(SUNNY, rooms=(box,)), frozenset({"rooms"}))
+    assert control.room_yaws == (0.1,) and not control.running

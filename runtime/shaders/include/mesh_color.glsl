@@ -9,16 +9,26 @@ in vec2 v_uv;
 in vec4 v_tint;
 out vec4 color;
 
-vec4 mesh_color() {
-    vec3 toward_eye = normalize(eye.xyz - eye.w * v_world);
-    vec3 normal = normalize(gl_FrontFacing ? v_normal : -v_normal);
+vec3 toward_the_eye() {
+    return normalize(eye.xyz - eye.w * v_world);
+}
+
+// The normal of the side that is seen.
+vec3 seen_normal(vec3 normal, vec3 toward_eye) {
+    normal = normalize(gl_FrontFacing ? normal : -normal);
     // A smooth normal may lean behind the horizon of a face that is still seen: bring it up to the horizon.
     float facing = dot(normal, toward_eye);
     if (facing < 0.0) normal = normalize(normal - facing * toward_eye);
+    return normal;
+}
+
+// `around` is diffuse light beside that of the lights; `mirrored` what the surface reflects, which a metal colours.
+vec4 mesh_color(vec3 normal, vec3 toward_eye, vec3 around, vec3 mirrored, float metal) {
     vec3 albedo = surface_albedo(v_uv, v_tint.rgb);
     if (output_kind == 1) return vec4(srgb_from_linear(albedo), 1.0);
     if (output_kind == 2) return vec4(view_from_world * normal * 0.5 + 0.5, 1.0);
     vec3 diffuse, specular;
     shade(normal, toward_eye, gloss, diffuse, specular);
-    return vec4(srgb_from_linear(albedo * diffuse + specular), 1.0);
+    vec3 colored = (1.0 - metal) * (diffuse + around) + metal * mirrored;
+    return vec4(srgb_from_linear(albedo * colored + (1.0 - metal) * mirrored + specular), 1.0);
 }

@@ -1,0 +1,215 @@
+"""Rooms on the GPU: every level of every face of their environments in one texture, and where they stand."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator, Sequence
+from typing import NamedTuple
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from impostor.environment.cube import padded
+from impostor.environment.environment import Environment
+from impostor.environment.room import SHAPES, Room
+from impostor.errors import GpuError, SettingsError
+from runtime.gpu import set_uniforms
+
+MAX_ROOMS = 4  # as the shader's array has it
+ROOM_ROWS = 9  # of four numbers, of each room in that array
+ABSENT = 3  # the shape of a room that is not there
+BRIGHTEST = 65504.0  # that 16 bits can hold
+LEAST_SIZE = 8  # of a level's faces in texels
+
+
+class Place(NamedTuple):
+    """Where an environment lies in the texture; texels."""
+
+    origin: tuple[int, int]
+    size: int
+    """Of the faces of level 0."""
+    levels: int
+
+
+class EnvironmentAtlas:
+    """Environments in one texture that `environment.glsl` reads, so that a pixel may choose among them.
+
+    Of each there are its faces, the same faces halved again and again, for mirrors that are far away, its prefiltered
+    levels, and its diffuse light. A face has a border of its neighbours' texels, so that the filter finds them.
+
+    Parameters
+    ----------
+    ctx : moderngl.Context
+    environments : sequence of Environment
+        At least one.
+
+    Attributes
+    ----------
+    texture : moderngl.Texture
+        RGBA16F: radiance brighter than 65504 is that.
+    places : tuple of Place
+
+    Raises
+    ------
+    GpuError
+        The GPU cannot hold a texture of that size.
+    """
+
+    def __init__(self, ctx: moderngl.Context, environments: Sequence[Environment]):
+        extents = [_extent(environment.size) for environment in environments]
+        corners, (width, height) = _packed(extents)
+        limit = ctx.info["GL_MAX_TEXTURE_SIZE"]
+        if max(width, height) > limit:
+            sizes = ", ".join(str(environment.size) for environment in environments)
+            problem = f"faces of {sizes} texels need a texture of {width}x{height}"
+            raise GpuError("environments", f"{problem}; this GPU holds at most {limit}x{limit}")
+        self.texture = ctx.texture((width, height), 4, dtype="f2")
+        self.texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        self.places = tuple(
+            self._write(environment, corner) for environment, corner in zip(environments, corners, strict=True)
+        )
+
+    def _write(self, environment: Environment, corner: tuple[int, int]) -> Place:
+        size, count = environment.size, len(environment.levels)
+        for level, halved in enumerate(_halvings(environment.faces, count)):
+            x, y = level_origin(size, level)
+            self._write_faces(halved, corner[0] + x, corner[1] + y)
+            if level:
+                x += 3 * (halved.shape[1] + 2)
+                self._write_faces(environment.levels[level], corner[0] + x, corner[1] + y)
+        x, y = level_origin(size, max(count, 2))
+        self._write_faces(environment.diffuse, corner[0] + x, corner[1] + y)
+        return Place(corner, size, count)
+
+    def _write_faces(self, faces: NDArray[np.float32], x: int, y: int) -> None:
+        """Write six faces, three beside each other in each of two rows."""
+        bordered = padded(np.minimum(faces, BRIGHTEST))
+        side = bordered.shape[1]
+        texels = np.zeros((2, side, 3, side, 4), np.float16)
+        texels[..., :3] = bordered.reshape(2, 3, side, side, 3).swapaxes(1, 2)
+        self.texture.write(texels.tobytes(), viewport=(x, y, 3 * side, 2 * side))
+
+    def release(self) -> None:
+        """Free the texture."""
+        self.texture.release()
+
+
+def check_rooms(rooms: Sequence[Room]) -> None:
+    """Refuse what is not a sequence of rooms, or too many of them.
+
+    Raises
+    ------
+    SettingsError
+    """
+    if not isinstance(rooms, Sequence) or isinstance(rooms, str):
+        raise SettingsError("rooms", f"a {type(rooms).__name__}; expected a list of Room")
+    for number, room in enumerate(rooms):
+        if not isinstance(room, Room):
+            raise SettingsError("rooms", f"number {number} is a {type(room).__name__}; expected a Room")
+    if len(rooms) > MAX_ROOMS:
+        raise SettingsError("rooms", f"{len(rooms)} of them; expected at most {MAX_ROOMS}")
+
+
+class RoomTable:
+    """Up to MAX_ROOMS rooms, as the uniforms and the texture that `rooms.glsl` and `environment.glsl` read.
+
+    Attributes
+    ----------
+    version : int
+        Grows whenever the rooms change; what was lit in older ones is stale.
+    """
+
+    def __init__(self, ctx: moderngl.Context):
+        self._ctx = ctx
+        self._rooms: tuple[Room, ...] = ()
+        self._key: tuple[Hashable, ...] = ()
+        self._environments: tuple[Environment, ...] = ()
+        self._atlas: EnvironmentAtlas | None = None
+        self._rows = np.zeros((MAX_ROOMS, ROOM_ROWS, 4), np.float32)
+        self.version = 0
+
+    def __len__(self) -> int:
+        return len(self._rooms)
+
+    def update(self, rooms: Sequence[Room]) -> None:
+        """Take over the rooms of this frame; nothing is written when they are those of the last one."""
+        key = tuple(room.key for room in rooms)
+        if key == self._key:
+            return
+        environments = tuple({id(room.environment): room.environment for room in rooms}.values())
+        if {id(each) for each in environments} - {id(each) for each in self._environments} or not environments:
+            self.release()
+            self._atlas = EnvironmentAtlas(self._ctx, environments) if environments else None
+            self._environments = environments
+        places = {} if self._atlas is None else dict(zip(map(id, self._environments), self._atlas.places, strict=True))
+        packed = [_room_rows(room, places[id(room.environment)]) for room in rooms]
+        # Those that are absent are looked at, too: what they show must be a number.
+        self._rows[:] = np.array([*packed, *packed[:1] * (MAX_ROOMS - len(packed))]) if packed else 0
+        self._rows[len(packed) :, 3, 3] = ABSENT
+        self._rooms, self._key = tuple(rooms), key
+        self.version += 1
+
+    def bind(self, program: moderngl.Program, unit: int, first: int = 0) -> None:
+        """Give a program that includes `rooms.glsl` its uniforms, beginning with some room; there must be one."""
+        assert self._atlas is not None
+        self._atlas.texture.use(unit)
+        # A program that reads the first room only has a shorter array.
+        array = program["rooms"]
+        assert isinstance(array, moderngl.Uniform)
+        rows = self._rows[first:].reshape(-1, 4)[: array.array_length]
+        set_uniforms(program, environments=unit, rooms=rows.ravel())
+
+    def release(self) -> None:
+        """Free the texture."""
+        if self._atlas is not None:
+            self._atlas.release()
+        self._atlas, self._environments, self._rooms, self._key = None, (), (), ()
+
+
+def _room_rows(room: Room, place: Place) -> NDArray[np.float64]:
+    """As `rooms.glsl` reads them, (ROOM_ROWS, 4)."""
+    rows = np.zeros((ROOM_ROWS, 4))
+    rows[:3] = room.room_from_world[:3]
+    rows[3] = *room.captured_at, SHAPES.index(room.shape)
+    rows[4] = *np.diag(room.environment_from_room), room.exposure
+    rows[5:8, :3], rows[5:8, 3] = room.environment_from_world, room.outside
+    rows[8] = *place.origin, place.size, place.levels - 1
+    return rows
+
+
+def level_origin(size: int, level: int) -> tuple[int, int]:
+    """Where a level's halved faces lie, from the environment's corner; its prefiltered ones are to the right of them.
+
+    Level 0 fills a row, level 1 another, all others share a third, whose end is the diffuse light.
+    """
+    first, second = 2 * (size + 2), 2 * (size // 2 + 2)
+    if level < 2:
+        return 0, level * first
+    return 12 * (size // 4 - (size >> level) + level - 2), first + second
+
+
+def _extent(size: int) -> tuple[int, int]:
+    """Width and height of all that belongs to an environment, with an alley that the filter does not cross."""
+    levels = (size // LEAST_SIZE).bit_length()
+    x, y = level_origin(size, max(levels, 2))
+    diffuse = 34
+    return max(3 * (size + 2), 6 * (size // 2 + 2), x + 3 * diffuse), y + 2 * max(size // 4 + 2, diffuse)
+
+
+def _packed(extents: Sequence[tuple[int, int]]) -> tuple[list[tuple[int, int]], tuple[int, int]]:
+    """Corners of rectangles, two in a row, and the size of what holds them."""
+    corners, width, y = [], 0, 0
+    for start in range(0, len(extents), 2):
+        row = extents[start : start + 2]
+        corners += [(0, y), (row[0][0], y)][: len(row)]
+        width = max(width, sum(extent[0] for extent in row))
+        y += max(extent[1] for extent in row)
+    return corners, (width, y)
+
+
+def _halvings(faces: NDArray[np.float32], count: int) -> Iterator[NDArray[np.float32]]:
+    """Faces, then each time half as large, every texel the mean of four."""
+    for _ in range(count):
+        yield faces
+        size = faces.shape[1] // 2
+        faces = faces.reshape(6, size, 2, size, 2, 3).mean(axis=(2, 4))

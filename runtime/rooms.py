@@ -1,0 +1,117 @@
+"""The room pass: rooms as the background of a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import moderngl
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from impostor.environment.room import Room
+from impostor.errors import SettingsError
+from runtime.checks import numbers
+from runtime.environments import RoomTable
+from runtime.gl_state import CallerState, set_state
+from runtime.gpu import load_program, set_uniforms
+from runtime.instances import Viewer
+
+ROUNDNESS = {"box": (0, 0, 0), "sphere": (1, 1, 1), "cylinder": (1, 0, 1), "plane": (0, 0, 0)}
+"""What a room can be shown on, all within the cube from -1 to 1: the cylinder stands upright between floor and ceiling,
+the plane is the cube's wall toward -z. The numbers say along which axes they are round."""
+_SIDES = np.array([[-1, -1], [1, -1], [1, 1], [-1, -1], [1, 1], [-1, 1]], np.float32)
+PLANE = np.insert(_SIDES, 2, -1, axis=1)
+PICTURE = np.insert(_SIDES, 2, 0, axis=1)
+
+
+class RoomPass:
+    """Draws rooms in the caller's framebuffer, seen from inside.
+
+    Parameters
+    ----------
+    ctx : moderngl.Context
+    """
+
+    def __init__(self, ctx: moderngl.Context):
+        self._shown = load_program(ctx, "room.vert", "room.frag")
+        self._far = load_program(ctx, "room_far.vert", "room_far.frag")
+        corners = {"cube": _cube(), "plane": PLANE, "picture": PICTURE}
+        self._buffers = [ctx.buffer(np.ascontiguousarray(each, np.float32)) for each in corners.values()]
+        programs = self._shown, self._shown, self._far
+        self._cube, self._plane, self._picture = (
+            ctx.vertex_array(program, [(buffer, "3f", "corner")])
+            for program, buffer in zip(programs, self._buffers, strict=True)
+        )
+
+    def draw(self, state: CallerState, rooms: Sequence[Room], table: RoomTable, viewer: Viewer) -> None:
+        """Draw all rooms that a table holds: the first far one behind everything, others as what they are."""
+        far = [number for number, room in enumerate(rooms) if room.shape == "far"]
+        for number in far[:1]:
+            self._draw_far(state, number, table, viewer)
+        for number, room in enumerate(rooms):
+            if room.shape != "far":
+                assert room.world_from_room is not None
+                self.draw_on(state, number, table, viewer, room.shape, room.world_from_room)
+
+    def draw_on(
+        self,
+        state: CallerState,
+        number: int,
+        table: RoomTable,
+        viewer: Viewer,
+        shape: str,
+        world_from_shape: NDArray[np.float64],
+    ) -> None:
+        """Draw a table's room of some number on a shape that stands somewhere; depth is tested and written."""
+        state.bind_target()
+        set_state(depth_test=True, depth_write=True, cull_back=shape != "plane", background=True)
+        table.bind(self._shown, 0, first=number)
+        set_uniforms(
+            self._shown,
+            clip_from_world=viewer.clip_from_world,
+            world_from_shape=world_from_shape,
+            shape_from_world=np.linalg.inv(world_from_shape),
+            eye=tuple(viewer.eye),
+            roundness=ROUNDNESS[shape],
+        )
+        (self._plane if shape == "plane" else self._cube).render(moderngl.TRIANGLES)
+
+    def _draw_far(self, state: CallerState, number: int, table: RoomTable, viewer: Viewer) -> None:
+        state.bind_target()
+        set_state(depth_test=True, background=True)
+        table.bind(self._far, 0, first=number)
+        set_uniforms(self._far, world_from_clip=np.linalg.inv(viewer.clip_from_world), eye=tuple(viewer.eye))
+        self._picture.render(moderngl.TRIANGLES)
+
+    def release(self) -> None:
+        """Free everything this pass made."""
+        for resource in (self._cube, self._plane, self._picture, *self._buffers, self._shown, self._far):
+            resource.release()
+
+
+def to_show(
+    rooms: Sequence[Room], room: Room, shape: str, world_from_shape: ArrayLike | None
+) -> tuple[int, NDArray[np.float64]]:
+    """A room's place among others, and where what it is to be shown on stands, (4, 4) float64.
+
+    Raises
+    ------
+    SettingsError
+        A room that is none of them, another shape than those of ROUNDNESS, a matrix without an inverse.
+    """
+    number = next((number for number, each in enumerate(rooms) if each is room), None)
+    if number is None:
+        raise SettingsError("room", "is not among the renderer's rooms; expected one of them")
+    if shape not in ROUNDNESS:
+        raise SettingsError("room", f"shown on {shape!r}; expected one of {', '.join(ROUNDNESS)}")
+    given = room.world_from_room if world_from_shape is None else world_from_shape
+    matrix = numbers("room", "world_from_shape", np.eye(4) if given is None else given, (4, 4))
+    if not abs(np.linalg.det(matrix)) > 0:
+        raise SettingsError("room", "world_from_shape has no inverse; expected a matrix that has one")
+    return number, matrix
+
+
+def _cube() -> NDArray[np.float32]:
+    """Corners (36, 3) of the triangles of the cube from -1 to 1, counter-clockwise as seen from inside."""
+    two = [np.insert(_SIDES[::side], 2, -side, axis=1) for side in (1, -1)]
+    return np.concatenate([np.roll(wall, axis, axis=1) for axis in range(3) for wall in two])

@@ -1,0 +1,14 @@
+#version 330
+// A mesh with bumps where there is no room.
+#include "srgb.glsl"
+#include "lights.glsl"
+#include "surface.glsl"
+#include "mesh_color.glsl"
+#include "bump.glsl"
+#include "crossfade.glsl"
+
+void main() {
+    if (shows_fan() || cut_out(v_uv, v_tint.a)) discard;
+    vec3 toward_eye = toward_the_eye();
+    color = mesh_color(seen_normal(bumped(v_normal), toward_eye), toward_eye, vec3(0.0), vec3(0.0), 0.0);
+}

@@ -1,0 +1,13 @@
+#version 330
+#include "surface.glsl"
+#include "shadow_points.glsl"
+in vec2 v_uv;
+in float v_alpha;
+flat in uint v_points;
+in float v_step;
+out uint mark;
+
+void main() {
+    if (cut_out(v_uv, v_alpha)) discard;
+    mark = mark_of(v_points, v_step);
+}

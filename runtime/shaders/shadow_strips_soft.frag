@@ -1,0 +1,10 @@
+#version 330
+// Marks the points of a source that are hidden; what is drawn is merged with what is there.
+#include "shadow_points.glsl"
+flat in uint v_points;
+in float v_step;
+out uint mark;
+
+void main() {
+    mark = mark_of(v_points, v_step);
+}

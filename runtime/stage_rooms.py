@@ -1,0 +1,97 @@
+"""The rooms of a scene: their environments, read or captured, and how they are turned."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from impostor.environment import Environment, Room
+from impostor.scene import Scene, SceneRoom
+from impostor.views import rotation_about_y
+from runtime.assets import Assets
+from runtime.room_capture import capture_environment
+
+CAPTURED_SIZE = 256  # texels along a face
+NEAREST = 0.05  # metres
+
+DrawScene = Callable[[NDArray[np.float64], NDArray[np.float64]], None]
+
+
+class StageRooms:
+    """Rooms of a scene, as a renderer takes them.
+
+    Attributes
+    ----------
+    all : list of Room
+    visible : list of Room
+        Those whose walls, or sky, are drawn.
+    """
+
+    def __init__(self):
+        self._described: Sequence[SceneRoom] = ()
+        self._environments: list[Environment | None] = []
+        self._yaws: tuple[float, ...] = ()
+        self.all: list[Room] = []
+        self.visible: list[Room] = []
+
+    def change(self, scene: Scene, environments: list[Environment | None]) -> None:
+        """Take over a scene's rooms and what `environments_of` found for them; captured ones come with `capture`."""
+        self._described, self._environments = scene.rooms, environments
+        self.turn([room.yaw for room in scene.rooms])
+
+    def __len__(self) -> int:
+        return len(self._described)
+
+    def turn(self, yaws: Sequence[float]) -> None:
+        """Turn all rooms by yaws in radians."""
+        self._yaws = tuple(yaws)
+        self.all, self.visible = [], []
+        for environment, described, yaw in zip(self._environments, self._described, yaws, strict=True):
+            if environment is not None:
+                room = described.around(environment, yaw)
+                self.all.append(room)
+                if described.visible:
+                    self.visible.append(room)
+
+    @property
+    def uncaptured(self) -> bool:
+        """Whether a room still waits for what is seen from its middle."""
+        return None in self._environments
+
+    def capture(self, ctx: moderngl.Context, draw: DrawScene, far: float) -> None:
+        """Fill the rooms that have no map with what is seen from their middles.
+
+        Parameters
+        ----------
+        ctx : moderngl.Context
+        draw : callable
+            Draws the scene without what mirrors, with `clip_from_view` and `view_from_world`, into the bound
+            framebuffer.
+        far : float
+            Metres to the far plane.
+        """
+        for number, described in enumerate(self._described):
+            if self._environments[number] is None:
+                self._environments[number] = capture_environment(
+                    ctx, draw, described.position, CAPTURED_SIZE, NEAREST, far, rotation_about_y(described.yaw).T
+                )
+        self.turn(self._yaws)
+
+    def corners(self) -> NDArray[np.float64]:
+        """Of the boxes around all rooms of some size, (K, 3), world space."""
+        unit = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1], [1])).reshape(4, -1)
+        found = [(np.asarray(room.world_from_room) @ unit)[:3].T for room in self.all if room.shape != "far"]
+        return np.concatenate(found) if found else np.empty((0, 3))
+
+
+def environments_of(scene: Scene, assets: Assets) -> list[Environment | None]:
+    """What each room of a scene shows; None for those that are to be captured.
+
+    Raises
+    ------
+    EnvironmentFileError
+    """
+    return [None if room.environment is None else assets.environment(room.environment) for room in scene.rooms]
