@@ -100,7 +100,7 @@ def fibonacci_dome(count: int, lowest: float = math.radians(10)) -> NDArray[np.f
     """
     _check_count(count)
     if not 0 <= lowest < math.pi / 2:
-        raise SettingsError("lowest", f"{math.degrees(lowest):g} degrees; expected 0 up to less than 90")
+        raise SettingsError("lowest", f"elevation {math.degrees(lowest):g} degrees; expected 0 up to less than 90")
     steps = np.arange(count) + 0.5
     height = 1 - (1 - math.sin(lowest)) * steps / count
     azimuth = 2 * np.pi * steps / GOLDEN
@@ -134,6 +134,8 @@ def parse_dome(text: str) -> NDArray[np.float64]:
         if kind == "rings":
             pairs = [part.split("x") for part in rest.split(",")]
             return ring_dome([(math.radians(float(elevation)), int(count)) for elevation, count in pairs])
+    except SettingsError as error:
+        raise SettingsError("dome", f"{text!r}: {error.problem}") from error
     except ValueError:
         pass
     raise SettingsError("dome", f"{text!r}; expected geodesic, fibonacci:COUNT[:LOWEST_DEG] or rings:DEGxCOUNT,...")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -172,7 +172,10 @@ def open_photographs(paths: Sequence[str | os.PathLike[str]]) -> Photographs:
 
 
 def decoded(
-    photographs: Photographs, pool: ThreadPoolExecutor, batch: int
+    photographs: Photographs,
+    pool: ThreadPoolExecutor,
+    batch: int,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Iterator[tuple[NDArray[np.int64], NDArray[Any]]]:
     """All photographs in batches; while one is worked on, threads begin to decode the next.
 
@@ -184,6 +187,8 @@ def decoded(
     batch : int
         How many photographs a batch has at most; `AHEAD` more are in memory. Batches are about of one size, whatever
         the threads are.
+    progress : callable, optional
+        Called with photographs decoded and photographs in all.
 
     Yields
     ------
@@ -219,6 +224,8 @@ def decoded(
                 begin(*following, taken=places)
             for index in indices.tolist():
                 decoding.pop(index).result()
+                if progress is not None:
+                    progress(index + 1, len(photographs))
             yield indices, memory[places.start : places.stop]
     finally:
         for each in decoding.values():

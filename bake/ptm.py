@@ -24,7 +24,7 @@ from bake.photographs import Photographs
 from bake.robust import robust_coefficients
 from impostor.errors import SettingsError
 from impostor.files.lp_file import CaptureSet
-from impostor.ptm.polynomials import TERMS, Curve, Parameters, Polynomials
+from impostor.ptm.polynomials import TERMS, Curve, Parameters, Polynomials, light_direction
 
 FORMATS = ("lrgb", "rgb", "lum")
 SPACES = ("ycbcr", "principal")
@@ -94,7 +94,7 @@ def fit_ptm(
         def fit(turn: Turn | None = None) -> NDArray[np.float32]:
             if not robust:
                 return accumulate(photographs, design, curve, pool, progress, turn)
-            lights = unit_lights(design.parameters) if meaning == "light" else None
+            lights = light_direction(*design.parameters.T) if meaning == "light" else None
             planes = robust_coefficients(photographs, design, lights, value_table(photographs, curve), pool, progress)
             if turn is not None:
                 turn_all(planes, turn, pool)
@@ -129,12 +129,6 @@ def light_parameters(capture: CaptureSet) -> NDArray[np.float64]:
         name = capture.photographs[behind[0]].name if capture.photographs else f"light {behind[0] + 1}"
         raise SettingsError(name, f"light's z is {capture.directions[behind[0], 2]:.3g}; expected above 0, in front")
     return capture.directions[:, :2]
-
-
-def unit_lights(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit vectors (N, 3) toward the lights of (lu, lv)."""
-    height = np.sqrt(np.clip(1 - (parameters**2).sum(axis=1), 0, 1))
-    return np.column_stack([parameters, height]).astype(np.float64)
 
 
 def check_choices(format: str, curve: str, space: str) -> None:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from impostor.cli import AsJson, Force, Quiet, UpAxis, as_flags, check_name, progress_bar
-from impostor.errors import SettingsError
-from impostor.ptm_cli import numbers
+from impostor.errors import PhotographError, SettingsError
+from impostor.ptm_cli import Jpeg, JpegPhotographs, light_flag, numbers
 
 if TYPE_CHECKING:
     import numpy as np
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from bake.photographs import Photographs
 
+SIZE, DEPTH = 256, 32.0  # texels, of what `capture` photographs
 PICTURES = {".png", ".tif", ".tiff", ".jpg", ".jpeg", ".tga", ".bmp"}
 
 Workers = Annotated[int | None, typer.Option(metavar="N", help="Threads; as many as processors if left out.")]
@@ -39,8 +40,10 @@ def fit(
     format: Annotated[str, typer.Option(metavar="lrgb|rgb|lum")] = "lrgb",
     robust: Annotated[bool, typer.Option("--robust", help="Trust shadows and highlights less.")] = False,
     linear: Annotated[bool, typer.Option("--linear", help="Fit light, not the stored sRGB values.")] = False,
-    jpeg: Annotated[int | None, typer.Option(metavar="QUALITY", help="Compress the planes; 1 to 100.")] = None,
-    space: Annotated[str, typer.Option(metavar="ycbcr|principal", help="Colour space of --format lum.")] = "ycbcr",
+    jpeg: Jpeg = None,
+    space: Annotated[
+        str | None, typer.Option(metavar="ycbcr|principal", help="Colour space of --format lum; ycbcr.")
+    ] = None,
     series: Annotated[
         int | None, typer.Option(metavar="1|2", help="Lines hold one or two parameters instead of a light.")
     ] = None,
@@ -58,15 +61,15 @@ def fit(
 
     started = time.monotonic()
     check_name(output, ".ptm", force)
-    curve = "linear" if linear else "srgb"
-    check_choices(format, curve, space)
+    curve, format = "linear" if linear else "srgb", format.lower()
+    check_choices(format, curve, space or "ycbcr")
+    if space is not None and format != "lum":
+        raise SettingsError("--space", f"given with --format {format}; expected --format lum")
     worker_count(workers)
     if series not in (None, 1, 2):
         raise SettingsError("--series", f"{series}; expected 1 or 2")
     if series is not None and view:
         raise SettingsError("--view", "given with --series; expected one of them")
-    if jpeg is not None and not 1 <= jpeg <= 100:
-        raise SettingsError("--jpeg", f"{jpeg}; expected 1 to 100")
     if jpeg is not None and format == "lum":
         raise SettingsError("--jpeg", "given with --format lum; expected lrgb or rgb, which have a compressed kind")
 
@@ -82,7 +85,7 @@ def fit(
             curve=curve,
             meaning="series" if series else "view" if view else "light",
             terms=terms,
-            space=space,
+            space=space or "ycbcr",
             robust=robust,
             workers=workers,
             progress=progress,
@@ -151,7 +154,7 @@ def direct(
     from impostor.files.pictures import save_png
 
     check_name(output, ".png", force)
-    lu, lv = numbers("--light", light, 2)
+    lu, lv = light_flag(light)
     photographs, parameters = _capture(images)
     triangulation = LightTriangulation(parameters)
     picture = render_direct(photographs, triangulation, lu, lv)
@@ -162,21 +165,25 @@ def direct(
         typer.echo(f"{images} -> {output} ({', '.join(parts)})")
 
 
-@as_flags("dome", "depth", "size", side="--from")
+@as_flags("dome", "depth", "size", side="--from", lights="--dome")
 def capture(
     subject: Annotated[Path, typer.Argument(metavar="MODEL|HEIGHTS.png", help="A mesh, or heights as a gray picture.")],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.lp", help="Photographs go beside it.")],
     dome: Annotated[
         str, typer.Option(metavar="geodesic|fibonacci:N[:DEG]|rings:DEGxN,...", help="Where the lights stand.")
     ] = "geodesic",
-    size: Annotated[int, typer.Option(metavar="TEXELS", help="Side of a mesh's photographs.")] = 256,
-    side: Annotated[str, typer.Option("--from", metavar="front|top", help="Where a mesh is seen from.")] = "front",
-    depth: Annotated[float, typer.Option(metavar="TEXELS", help="Height of white in a picture of heights.")] = 32.0,
+    size: Annotated[int | None, typer.Option(metavar="TEXELS", help=f"Side of a mesh's photographs; {SIZE}.")] = None,
+    side: Annotated[
+        str | None, typer.Option("--from", metavar="front|top", help="Where a mesh is seen from; front.")
+    ] = None,
+    depth: Annotated[
+        float | None, typer.Option(metavar="TEXELS", help=f"Height of white in a picture of heights; {DEPTH:g}.")
+    ] = None,
     albedo: Annotated[Path | None, typer.Option(metavar="PNG", help="Colour of a picture of heights.")] = None,
     gloss: Annotated[str | None, typer.Option(metavar="STRENGTH,SHININESS", help="A highlight.")] = None,
     no_bounce: Annotated[bool, typer.Option("--no-bounce", help="Direct light only.")] = False,
-    jpeg: Annotated[int | None, typer.Option(metavar="QUALITY", help="JPEG instead of PNG; 1 to 100.")] = None,
-    up: UpAxis = "y",
+    jpeg: JpegPhotographs = None,
+    up: UpAxis = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -189,13 +196,14 @@ def capture(
     directions = parse_dome(dome)
     strength, shininess = (0.0, 60.0) if gloss is None else numbers("--gloss", gloss, 2)
     highlight = strength, shininess
-    if jpeg is not None and not 1 <= jpeg <= 100:
-        raise SettingsError("--jpeg", f"{jpeg}; expected 1 to 100")
     if subject.suffix.lower() in PICTURES:
-        relief = relief_of_picture(subject, depth, albedo, highlight)
+        _refuse(subject, "a model", size=size, **{"from": side}, up=up)
+        relief = relief_of_picture(subject, DEPTH if depth is None else depth, albedo, highlight)
     else:
         from impostor.model import load_model
 
+        _refuse(subject, "a picture of heights", depth=depth, albedo=albedo)
+        size, side = SIZE if size is None else size, "front" if side is None else side
         relief = relief_of_model(load_model(subject, up=up or "y"), size, side, highlight)
     with progress_bar(f"photographing {subject.name}", quiet) as progress:
         pictures = photograph(relief, directions, bounce=not no_bounce, progress=progress)
@@ -224,6 +232,7 @@ def lights(
 ) -> None:
     """Find the lights of a capture set from their highlights on a mirror ball."""
     from bake.chrome_ball import Circle, circle_of_mask, lights_of_ball, read_mask
+    from bake.ptm import light_parameters
     from impostor.files.lp_file import CaptureSet, write_lp
 
     check_name(output, ".lp", force)
@@ -232,12 +241,23 @@ def lights(
     named = of or photographs
     if len(named) != len(photographs):
         raise SettingsError("--of", f"{len(named)} photographs; expected {len(photographs)}, one for each of the ball")
+    for path in named:
+        if not path.is_file():
+            raise PhotographError(path, "does not exist; expected a photograph for the .lp to name")
     ball = circle_of_mask(read_mask(mask), mask) if mask else Circle(*numbers("--circle", circle or "", 3))
-    directions = lights_of_ball(photographs, ball)
-    write_lp(CaptureSet(tuple(named), directions), output, force)
+    found = CaptureSet(tuple(named), lights_of_ball(photographs, ball))
+    light_parameters(found)  # what `fit` would refuse is not written
+    write_lp(found, output, force)
     if not quiet:
         place = f"ball at {ball.x:.1f}, {ball.y:.1f}, radius {ball.radius:.1f}"
-        typer.echo(f"{len(directions)} lights -> {output} ({place})")
+        typer.echo(f"{len(named)} lights -> {output} ({place})")
+
+
+def _refuse(subject: Path, wanted: str, **flags: object) -> None:
+    """Refuse flags that say nothing about what is to be photographed."""
+    for name, value in flags.items():
+        if value is not None:
+            raise SettingsError(f"--{name}", f"given with {subject}; expected it with {wanted}")
 
 
 def _capture(lp: Path) -> tuple[Photographs, NDArray[np.float64]]:

@@ -93,8 +93,10 @@ def photograph(
         A light that is not above the surface.
     """
     directions = np.asarray(lights, np.float64)
-    if directions.ndim != 2 or directions.shape[1] != 3 or not (directions[:, 2] > 0).all():
-        raise SettingsError("lights", f"of shape {directions.shape}; expected (N, 3), each z above 0")
+    if directions.ndim != 2 or directions.shape[1] != 3:
+        raise SettingsError("lights", f"of shape {directions.shape}; expected (N, 3)")
+    if not (directions[:, 2] > 0).all():
+        raise SettingsError("lights", f"lowest z is {directions[:, 2].min():g}; expected above 0, above the horizon")
     normals = relief.normals()
     exchange = form_factors(relief) if bounce else None
     pictures = np.empty((len(directions), *relief.albedo.shape), np.float32)

@@ -78,7 +78,7 @@ def write(folder: Path, found: dict[str, Any], tables: list[Table]) -> Path:
     here["machine"] = found
     here["tables"] |= {table.name: {"commit": commit(), **table.as_json()} for table in tables}
     with atomic_output(path, force=True) as temporary:
-        temporary.write_text(json.dumps(results, indent=1, sort_keys=True) + "\n")
+        temporary.write_text(json.dumps(results, indent=1) + "\n")
     frames = here["tables"].get("frames")
     if frames:
         _save(folder / f"{kind}-frames.png", _chart(frames))

@@ -43,7 +43,7 @@ def info(
     force: Force = False,
 ) -> None:
     """Say how bright an environment map is, and where its light comes from."""
-    from impostor.environment.summary import environment_sheet, environment_summary
+    from impostor.environment.summary import environment_sheet, environment_summary, lights_of
     from impostor.files.environment_file import describe_map
     from impostor.files.pictures import save_png
 
@@ -52,10 +52,11 @@ def info(
     if not 1 <= lights <= MOST_LIGHTS:
         raise SettingsError("--lights", f"{lights}; expected 1 to {MOST_LIGHTS}")
     environment = _read(file, None, exposure, mirrored, flip_y)
-    summary = {"file": str(file), "kind": describe_map(file)} | environment_summary(environment, lights)
+    brightest = lights_of(environment, lights)
+    summary = {"file": str(file), "kind": describe_map(file)} | environment_summary(environment, brightest)
     del summary["name"]
     if picture is not None:
-        save_png(picture, environment_sheet(environment, lights), force=force)
+        save_png(picture, environment_sheet(environment, brightest), force=force)
     print_summary(summary if as_json else _with_lines_of_lights(summary), as_json)
 
 

@@ -18,8 +18,23 @@ if TYPE_CHECKING:
 
 OUTPUTS = ("lit", "normal", "albedo")
 
+
+def _known_quality(quality: int | None) -> int | None:
+    from impostor.files.ptm_file import check_quality
+
+    if quality is not None:
+        check_quality(quality, "--jpeg")
+    return quality
+
+
 PtmFile = Annotated[Path, typer.Argument(metavar="PTM", help="A .ptm file.")]
-Jpeg = Annotated[int | None, typer.Option(metavar="QUALITY", help="Compress the planes; 1 to 100.")]
+Jpeg = Annotated[
+    int | None, typer.Option(metavar="QUALITY", help="Compress the planes; 1 to 100.", callback=_known_quality)
+]
+JpegPhotographs = Annotated[
+    int | None,
+    typer.Option("--jpeg", metavar="QUALITY", help="JPEG instead of PNG; 1 to 100.", callback=_known_quality),
+]
 NoPrediction = Annotated[
     bool, typer.Option("--no-prediction", help="No plane as a difference from another: for viewers that read none.")
 ]
@@ -35,13 +50,28 @@ def register(ptm: typer.Typer) -> None:
         ptm.command(command.__name__.replace("_", "-"))(command)
 
 
-def info(ptm: PtmFile, as_json: AsJson = False) -> None:
+def info(
+    ptm: PtmFile,
+    as_json: AsJson = False,
+    coding: Annotated[
+        bool, typer.Option("--coding", help="Also what the 1998 shift scheme and a codebook would lose.")
+    ] = False,
+    quiet: Quiet = False,
+) -> None:
     """Say what is in a PTM."""
     from impostor.summary import ptm_summary
 
-    print_summary(ptm_summary(ptm), as_json)
+    summary = ptm_summary(ptm)
+    if coding:
+        from impostor.files.ptm_file import read_ptm
+        from impostor.ptm.coding import coding_losses
+
+        with progress_bar(f"coding {ptm.name}", quiet) as progress:
+            summary |= coding_losses(read_ptm(ptm).polynomials(), progress)
+    print_summary(summary, as_json)
 
 
+@as_flags("gain")
 def render(
     ptm: PtmFile,
     output: Annotated[Path, typer.Option("-o", metavar="OUT.png")],
@@ -63,8 +93,11 @@ def render(
     at = numbers("--light", light, 2)
     shine = _highlight(specular)
     polynomials = read_ptm(ptm).polynomials()
-    if polynomials.parameters != "series" and at[0] ** 2 + at[1] ** 2 > 1:
-        raise SettingsError("--light", f"{light}; expected LU and LV of a unit vector, u² + v² at most 1")
+    if polynomials.parameters != "series":
+        at = light_flag(light)
+    for flag, given in (("--output", show != "lit"), ("--gain", gain != 1), ("--specular", shine is not None)):
+        if given:
+            _check_lights(polynomials, ptm, flag)
     if show == "normal":
         picture = _bytes(normals(polynomials) / 2 + 0.5)
     elif show == "albedo":
@@ -103,6 +136,7 @@ def convert(
         typer.echo(f"{ptm} ({before / 1e6:.2f} MB) -> {output} ({read.format}, {written / 1e6:.2f} MB)")
 
 
+@as_flags("gain")
 def relight_video(
     ptm: PtmFile,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.mp4")],
@@ -128,6 +162,7 @@ def relight_video(
     if not 0 <= elevation <= 90:
         raise SettingsError("--elevation", f"{elevation:g}; expected 0 to 90")
     shine, polynomials = _highlight(specular), read_ptm(ptm).polynomials()
+    _check_lights(polynomials, ptm, "relight-video")
     relit, count = _Relit(polynomials, gain, shine), max(round(seconds * rate), 1)
     out = np.cos(np.radians(elevation))
     with (
@@ -165,8 +200,8 @@ def synthesise(
     if max(width, height) > LARGEST_SIDE:
         raise SettingsError("--size", f"{size}; expected sides up to {LARGEST_SIDE}, as a .ptm can hold")
     read = read_ptm(ptm)
-    with as_flags("size", "patch", "seed"):
-        made = quilted(read, (width, height), patch, seed)
+    with as_flags("size", "patch", "seed"), progress_bar(f"quilting {ptm.name}", quiet) as progress:
+        made = quilted(read, (width, height), patch, seed, progress)
     written = _write(made, output, jpeg, no_prediction, force)
     if not quiet:
         typer.echo(f"{ptm} ({read.size[0]}x{read.size[1]}) -> {output} ({width}x{height}, {written / 1e6:.1f} MB)")
@@ -185,11 +220,11 @@ class _Relit:
     def at(self, u: float, v: float) -> NDArray[np.uint8]:
         """The picture (H, W, 3), sRGB."""
         from impostor.ptm.normals import relight_specular
-        from impostor.ptm.polynomials import evaluate
+        from impostor.ptm.polynomials import evaluate, light_direction
 
         if self._shine is None or self._normals is None:
             return _on_curve(self._polynomials, evaluate(self._polynomials, u, v))
-        toward = (u, v, max(1 - u * u - v * v, 0.0) ** 0.5)
+        toward = light_direction(u, v)
         strength, exponent = self._shine
         lit = relight_specular(self._polynomials, self._normals, toward, specular=strength, exponent=exponent)
         return _on_curve(self._polynomials, lit)
@@ -214,11 +249,16 @@ def _write(ptm: Ptm, output: Path, jpeg: int | None, no_prediction: bool, force:
         if no_prediction:
             raise SettingsError("--no-prediction", "given without --jpeg; expected both, raw files predict nothing")
         return write_ptm(ptm, output, force=force)
-    if not 1 <= jpeg <= 100:
-        raise SettingsError("--jpeg", f"{jpeg}; expected 1 to 100")
     if ptm.format == "LUM":
         raise SettingsError("--jpeg", "the PTM is LUM; expected LRGB or RGB, which have a compressed kind")
     return write_ptm(ptm, output, compression="jpeg", quality=jpeg, predict=not no_prediction, force=force)
+
+
+def _check_lights(polynomials: Polynomials, ptm: Path, wanted: str) -> None:
+    """Refuse a PTM whose parameters are no light's, where what is wanted needs that."""
+    if polynomials.parameters != "light":
+        whose = "the viewer's direction" if polynomials.parameters == "view" else "those of an image series"
+        raise SettingsError(ptm, f"its parameters are {whose}; expected light directions, for {wanted}")
 
 
 def _highlight(specular: str | None) -> tuple[float, float] | None:
@@ -228,6 +268,14 @@ def _highlight(specular: str | None) -> tuple[float, float] | None:
     if strength < 0 or exponent < 0:
         raise SettingsError("--specular", f"{specular}; expected a strength and an exponent of 0 or more")
     return strength, exponent
+
+
+def light_flag(text: str) -> tuple[float, ...]:
+    """(lu, lv) of `--light`: two components of a unit vector."""
+    at = numbers("--light", text, 2)
+    if at[0] ** 2 + at[1] ** 2 > 1:
+        raise SettingsError("--light", f"{text}; expected LU and LV of a unit vector, lu² + lv² at most 1")
+    return at
 
 
 def numbers(flag: str, text: str, count: int) -> tuple[float, ...]:

@@ -16,7 +16,7 @@ from impostor.shadow_projection import Ground
 from impostor.views import rotation_about_y
 
 Vector = tuple[float, float, float]
-PARTS = ("camera", "lights", "sun", "ambient", "background", "ground", "rooms", "instances", "meshes", "surfaces")
+PARTS = ("camera", "lights", "sun", "ambient", "background", "ground", "rooms", "shadow_lights", "contact_shadow", "instances", "meshes", "surfaces")
 """The fields of a scene that can change one without the other."""
 
 
@@ -208,6 +208,8 @@ class SceneGround:
     tile : float
     reach : float
         Metres to where the ground has faded out.
+    visible : bool
+        Whether it is drawn; else only shadows are, on whatever is there.
     """
 
     height: float = 0.0
@@ -218,6 +220,7 @@ class SceneGround:
     ptm: Path | None = None
     tile: float = 1.0
     reach: float = 100.0
+    visible: bool = True
 
     @property
     def plane(self) -> Ground:
@@ -331,6 +334,8 @@ class Scene:
     rooms : tuple of SceneRoom
     shadow_lights : int
         How many of the brightest lights of a room cast shadows.
+    contact_shadow : float
+        0 to 1: how dark the ambient light is right under what stands on the ground.
     instances : tuple of Placement
         One for each subject that shines alike.
     meshes : tuple of SceneMesh
@@ -347,7 +352,8 @@ class Scene:
     background: Vector | None = None
     ground: SceneGround | None = None
     rooms: tuple[SceneRoom, ...] = ()
-    shadow_lights: int = 1
+    shadow_lights: int = 2
+    contact_shadow: float = 0.0
     instances: tuple[Placement, ...] = ()
     meshes: tuple[SceneMesh, ...] = ()
     surfaces: tuple[SceneSurface, ...] = ()

@@ -44,7 +44,7 @@ class ContactShadows:
     strength : float
         0 to 1: the part of that light that is gone right under an object.
     reach : float
-        Up to which part of an object's height it counts: with 0.15 a tree has a dark foot, with 1 a whole crown darkens
+        Up to which part of an object's height it counts: with 0.25 a tree has a dark foot, with 1 a whole crown darkens
         the ground under it. The darkening fades with the height and reaches twice as far to the side.
 
     Raises
@@ -54,7 +54,7 @@ class ContactShadows:
     """
 
     strength: float = 1.0
-    reach: float = 0.15
+    reach: float = 0.25
 
     def __post_init__(self):
         for name, least in (("strength", "from 0"), ("reach", "above 0")):
@@ -221,7 +221,7 @@ def _hulls(records: NDArray[np.void], clip_from_world: NDArray[np.float64]) -> N
 
 def _axes_about(up: NDArray[np.float64]) -> NDArray[np.float64]:
     """Unit vectors u, up and v, (3, 3): about +Y they are +X, +Y and +Z."""
-    aside = np.eye(3)[2 if abs(up[0]) < 0.9 * np.linalg.norm(up) else 0]
+    aside = np.eye(3)[2 if abs(up[2]) < 0.9 * np.linalg.norm(up) else 0]
     u = np.cross(up, aside)
     axes = np.stack([u, up, np.cross(u, up)])
     return axes / np.linalg.norm(axes, axis=1)[:, None]

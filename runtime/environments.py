@@ -9,9 +9,10 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from impostor.environment.blending import EDGE
 from impostor.environment.cube import padded
 from impostor.environment.environment import Environment
-from impostor.environment.room import SHAPES, Room
+from impostor.environment.room import SHAPES, WALL, Room
 from impostor.errors import GpuError, SettingsError
 from runtime.gpu import set_uniforms
 
@@ -159,11 +160,43 @@ class RoomTable:
         rows = self._rows[first:].reshape(-1, 4)[: array.array_length]
         set_uniforms(program, environments=unit, rooms=rows.ravel())
 
+    def alone_around(self, centers: NDArray[np.float64], radii: NDArray[np.float64]) -> NDArray[np.intp]:
+        """The room that alone lights and is mirrored by all that is in a sphere, (N,); -1 where there may be others.
+
+        Parameters
+        ----------
+        centers : ndarray, (N, 3) float64
+            World space.
+        radii : ndarray, (N,) float64
+        """
+        far = [room.shape == "far" for room in self._rooms]
+        # Far rooms light what is near a wall.
+        deep = 1 - EDGE if any(far) else 1.0
+        found = np.array([_within(room, centers, radii, deep) for room in self._rooms])
+        inside, beside = found[:, 0], found[:, 1]
+        others = (~beside).sum(axis=0)
+        alone = np.where(inside.any(axis=0) & (others == 1), inside.argmax(axis=0), -1)
+        return np.where(others == 0, far.index(True), alone) if sum(far) == 1 else alone
+
     def release(self) -> None:
         """Free the texture."""
         if self._atlas is not None:
             self._atlas.release()
         self._atlas, self._environments, self._rooms, self._key = None, (), (), ()
+
+
+def _within(
+    room: Room, centers: NDArray[np.float64], radii: NDArray[np.float64], deep: float
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Whether spheres lie in the inner part of a room, and whether they lie beside it; for certain, (N,) each."""
+    if room.shape == "far":
+        return np.zeros(len(radii), bool), np.ones(len(radii), bool)
+    middles, lengths = room.in_room(centers), np.linalg.norm(room.room_from_world[:3, :3], axis=1)
+    if room.shape == "sphere":
+        away, reach = np.linalg.norm(middles, axis=1), radii * lengths.max()
+        return away + reach <= deep, away - reach > 1 + WALL
+    away, reach = np.abs(middles), radii[:, None] * lengths
+    return (away + reach <= deep).all(axis=1), (away - reach > 1 + WALL).any(axis=1)
 
 
 def _room_rows(room: Room, place: Place) -> NDArray[np.float64]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter, grey_dilation
 
 from impostor.fan import DEPTH_CODES, Fan
 from impostor.model import Model
@@ -17,6 +18,8 @@ DIRECTIONS = 48
 WIDEST = 2.0
 """Tangent from straight up within which light is looked for: four fifths of what reaches level ground."""
 MOST_VIEWS = 24
+SMOOTHED = 0.7  # texels, standard deviation
+RIM = 3  # texels
 GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 Vector2 = NDArray[np.float64]
 
@@ -87,14 +90,14 @@ def model_footprint(model: Model, axes: NDArray[np.float64], reach: float) -> Fo
     heights = [part.positions @ axes[1] for part in model.primitives]
     base, top = min(float(h.min()) for h in heights), max(float(h.max()) for h in heights)
     metres = reach * (top - base)
+    if not metres > 0:
+        return _empty()
     corners = []
     for part, height in zip(model.primitives, heights, strict=True):
         low = height[part.triangles].min(axis=1) <= base + metres
         corners.append(part.positions[part.triangles[low]].astype(np.float64) @ axes.T)
     points = _scattered(np.concatenate(corners))
     points = points[points[:, 1] <= base + metres]
-    if not len(points):
-        return _empty()
     low, high = _rectangle(points[:, [0, 2]], metres)
     column, row = np.clip(((points[:, [0, 2]] - low) / (high - low) * SIDE).astype(np.intp), 0, SIDE - 1).T
     lowest = np.full((SIDE, SIDE), np.inf)
@@ -171,8 +174,8 @@ def _hidden(lowest: NDArray[np.float64], low: Vector2, high: Vector2, reach: flo
 
     Notes
     -----
-    Light comes from directions spread by the cosine over a cone. One that is blocked counts the less the higher that
-    is, so that the darkening ends smoothly at the reach.
+    Light comes from directions spread by the cosine over a cone. One that is blocked counts less near the reach, so
+    that the darkening ends smoothly there.
     """
     number = np.arange(DIRECTIONS)
     sine = np.sqrt((number + 0.5) / DIRECTIONS) * WIDEST / np.hypot(1, WIDEST)
@@ -187,8 +190,18 @@ def _hidden(lowest: NDArray[np.float64], low: Vector2, high: Vector2, reach: flo
             right, down = np.rint(height * np.array([along.real, along.imag]) * texels).astype(int)
             seen = padded[pad + down : pad + down + SIDE, pad + right : pad + right + SIDE]
             for lift in range(LIFTS):
-                blocked[lift][seen + lift / LIFTS * reach <= height] = 1 - height / reach
+                blocked[lift][seen + lift / LIFTS * reach <= height] = 1 - (height / reach) ** 2
         total += blocked
-    total /= DIRECTIONS * (1 - 0.5 / STEPS)
+    total /= DIRECTIONS
+    total[0] = _under_contact(total[0], lowest < reach / STEPS)
+    total = gaussian_filter(total, (0, SMOOTHED, SMOOTHED))
     total[:, [0, -1]] = total[:, :, [0, -1]] = 0
     return np.rint(np.moveaxis(total, 0, -1) * 255).astype(np.uint8)
+
+
+def _under_contact(hidden: NDArray[np.float32], contact: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """As dark under the rim of what touches the ground as right beside it, so that no black line shows around it."""
+    beside = np.where(contact, 0, hidden)
+    for _ in range(RIM):
+        beside = np.where(contact, grey_dilation(beside, (3, 3)), hidden)
+    return np.where(contact & (beside > 0), beside, hidden)

@@ -22,6 +22,15 @@ from runtime.lights import LightTable
 
 ALPHA_MODES = {"OPAQUE": 0, "MASK": 1, "BLEND": 2}
 OUTPUTS = {"lit": 0, "albedo": 1, "normal": 2}
+PROGRAMS = (
+    "mesh",
+    "mesh_fading",
+    "mesh_bump",
+    "mesh_room",
+    "mesh_rooms",
+    "mesh_room_mirrored",
+    "mesh_rooms_mirrored",
+)
 LIGHTS_UNIT, BUMP_UNIT, ROOMS_UNIT = 1, 2, 3  # texture units beside the base texture's
 VERTEX_DTYPE = np.dtype([("position", "f4", (3,)), ("normal", "f4", (3,)), ("uv", "f4", (2,)), ("tint", "u1", (4,))])
 BUMPED_DTYPE = np.dtype([*VERTEX_DTYPE.descr, ("tangent", "f4", (4,))])
@@ -131,12 +140,15 @@ class MeshInstance:
     gloss : Gloss
     reflection : Reflection, optional
         What it mirrors where there are rooms.
+    visible : bool
+        Whether it is drawn, and casts a shadow.
     """
 
     buffers: MeshBuffers
     world_from_model: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
     gloss: Gloss = field(default_factory=Gloss)
     reflection: Reflection | None = None
+    visible: bool = True
 
 
 def check_places(meshes: Sequence[MeshInstance]) -> None:
@@ -194,15 +206,24 @@ class MeshCopies:
 
     def seen_by(self, viewer: Viewer) -> MeshCopies:
         """Those whose bounding sphere touches the view frustum, near to far."""
+        centers, radii = self.spheres
+        seen = np.flatnonzero(viewer.sees(centers, radii))
+        return self.take(seen[np.argsort(-(centers[seen] @ viewer.view_from_world[2, :3]), kind="stable")])
+
+    @property
+    def spheres(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Middles (N, 3) and radii (N,) of the copies' bounding spheres, world space."""
         model, turned = self.buffers.model, self.world_from_model[:, :3, :3]
         centers = turned @ model.bounds.mean(axis=0) + self.world_from_model[:, :3, 3]
         # The largest row of its product with itself bounds how a matrix stretches, exactly where axes stay at right
         # angles.
         stretch = np.abs(turned.swapaxes(1, 2) @ turned).sum(axis=2).max(axis=1)
-        seen = np.flatnonzero(viewer.sees(centers, model.radius * np.sqrt(stretch)))
-        seen = seen[np.argsort(-(centers[seen] @ viewer.view_from_world[2, :3]), kind="stable")]
-        shares = None if self.fan_share is None else self.fan_share[seen]
-        return MeshCopies(self.buffers, self.gloss, self.world_from_model[seen], shares, self.reflection)
+        return centers, model.radius * np.sqrt(stretch)
+
+    def take(self, index: NDArray[np.intp]) -> MeshCopies:
+        """Some of them."""
+        shares = None if self.fan_share is None else self.fan_share[index]
+        return MeshCopies(self.buffers, self.gloss, self.world_from_model[index], shares, self.reflection)
 
     def records(self) -> NDArray[np.void]:
         """As (N,) COPY_DTYPE."""
@@ -224,8 +245,7 @@ class MeshPass:
 
     def __init__(self, ctx: moderngl.Context):
         self._ctx = ctx
-        names = "mesh", "mesh_fading", "mesh_bump", "mesh_room", "mesh_rooms"
-        self._programs = {name: load_program(ctx, "mesh.vert", f"{name}.frag") for name in names}
+        self._programs = {name: load_program(ctx, "mesh.vert", f"{name}.frag") for name in PROGRAMS}
         self._copies = InstanceBuffer(ctx, COPY_DTYPE)
         self.statistics = {"meshes": 0, "triangles": 0}
 
@@ -254,14 +274,12 @@ class MeshPass:
         self.statistics = {"meshes": 0, "triangles": 0}
         seen = [group.seen_by(viewer) for group in copies if len(group.world_from_model)]
         state.bind_target()
-        around = len(rooms) if output == "lit" else 0
-        for name, program in self._programs.items():
-            groups = [group for group in seen if len(group.world_from_model) and _program_name(group, around) == name]
-            if not groups:
-                continue
+        parts = [part for group in seen for part in _parts(group, rooms if output == "lit" else None)]
+        for name, first in dict.fromkeys((name, first) for name, first, _ in parts):
+            program = self._programs[name]
             lights.bind(program, LIGHTS_UNIT)
-            if around:
-                rooms.bind(program, ROOMS_UNIT)
+            if "rooms" in program:
+                rooms.bind(program, ROOMS_UNIT, first)
             set_uniforms(
                 program,
                 clip_from_world=viewer.clip_from_world,
@@ -269,8 +287,9 @@ class MeshPass:
                 eye=tuple(viewer.eye),
                 output_kind=OUTPUTS[output],
             )
-            for group in groups:
-                self._draw_group(program, group)
+            for each, number, group in parts:
+                if (each, number) == (name, first):
+                    self._draw_group(program, group)
 
     def _draw_group(self, program: moderngl.Program, group: MeshCopies) -> None:
         count = len(group.world_from_model)
@@ -290,18 +309,26 @@ class MeshPass:
             resource.release()
 
 
-def _program_name(group: MeshCopies, rooms: int) -> str:
-    """The cheapest program that draws copies among so many rooms."""
-    if rooms:
-        return "mesh_room" if rooms == 1 else "mesh_rooms"
-    if group.buffers.bump is not None:
-        return "mesh_bump"
-    return "mesh" if group.fan_share is None else "mesh_fading"
+def _parts(group: MeshCopies, rooms: RoomTable | None) -> list[tuple[str, int, MeshCopies]]:
+    """Copies by the cheapest program that draws them and the first room that it reads."""
+    if not len(group.world_from_model):
+        return []
+    bumped = group.buffers.bump is not None
+    if rooms is None or not len(rooms):
+        return [("mesh_bump" if bumped else "mesh" if group.fan_share is None else "mesh_fading", 0, group)]
+    suffix = "_mirrored" if bumped or group.reflection is not None else ""
+    if len(rooms) == 1:
+        return [(f"mesh_room{suffix}", 0, group)]
+    alone = rooms.alone_around(*group.spheres)
+    split = [(int(number), group.take(np.flatnonzero(alone == number))) for number in np.unique(alone)]
+    return [
+        (f"mesh_rooms{suffix}" if number < 0 else f"mesh_room{suffix}", max(number, 0), part) for number, part in split
+    ]
 
 
 def _set_bumps(program: moderngl.Program, buffers: MeshBuffers) -> None:
     bump = buffers.bump
-    set_uniforms(program, bump_picture=BUMP_UNIT, bumps=int(bump is not None))
+    set_uniforms(program, bump_picture=BUMP_UNIT, bumps=bump is not None)
     if bump is None or buffers.bumps is None:
         return
     buffers.bumps.use(BUMP_UNIT)
@@ -311,7 +338,7 @@ def _set_bumps(program: moderngl.Program, buffers: MeshBuffers) -> None:
 
 
 def _set_reflection(program: moderngl.Program, reflection: Reflection | None) -> None:
-    set_uniforms(program, mirrors=int(reflection is not None), metal=0.0 if reflection is None else reflection.metal)
+    set_uniforms(program, mirrors=reflection is not None, metal=0.0 if reflection is None else reflection.metal)
     if reflection is not None:
         terms = reflection.strength, reflection.least, reflection.exponent, reflection.roughness
         set_uniforms(program, reflection=terms, any_power=int(reflection.exponent not in (4, 5)))

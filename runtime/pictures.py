@@ -150,7 +150,7 @@ def _draw_ground(renderer: ImpostorRenderer, subject: Fan | Model, camera: Camer
     reach = GROUND_REACH * subject.radius
     surface = GroundSurface(GROUND_ALBEDO, middle=middle, reach=reach, background=settings.background)
     renderer.draw_ground(*camera.matrices, ground, surface)
-    renderer.draw_shadows(*camera.matrices, ground)
+    renderer.draw_shadows(*camera.matrices, ground, surface)
 
 
 def _depth_picture(depth: NDArray[np.float32], subject: Fan | Model, camera: Camera) -> NDArray[np.uint8]:

@@ -8,8 +8,9 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from impostor.environment.colormap import SHARPEST
 from impostor.environment.reflection import Reflection
-from impostor.normal_code import BYTE_TO_NORMAL
+from impostor.normal_code import BYTE_TO_NORMAL, CODE_COUNT
 from runtime.environments import RoomTable
 from runtime.fan_textures import FanTextures
 from runtime.gl_state import set_state
@@ -35,8 +36,9 @@ PLACE_DTYPE = np.dtype(
         ("padding", "f4", (3,)),
     ]
 )
-SPAN_DTYPE = np.dtype([("first", "f4"), ("end", "f4")])
+SPAN_DTYPE = np.dtype([("first", "f4", (2,)), ("end", "f4", (2,))])
 TILE_DTYPE = np.dtype([("place", "f4", (4,)), ("part", "f4", (4,)), ("origin", "f4", (3,))])
+PROGRAMS = "colormap", *(f"colormap_{around}{how}" for around in ("room", "rooms") for how in ("", "_mirrored"))
 CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]], np.float32)
 
 
@@ -50,7 +52,7 @@ class Surroundings:
         At least one room.
     places : ndarray, (N,) PLACE_DTYPE
         For each row: the view's centre in the world, the instance's scale, each room's part in the diffuse light, 1
-        for the room that is mirrored, and the view. In one room all but the centre and the scale are left alone.
+        for the room that is mirrored, and the view. One room alone has no parts to be told.
     reflection : Reflection, optional
     points : moderngl.Texture, optional
         `FanTextures.points`, for what mirrors.
@@ -77,9 +79,9 @@ class ColormapPass:
     ROWS = 1024
 
     def __init__(self, ctx: moderngl.Context):
-        self._ctx = ctx
         self._normals = ctx.texture((256, 1), 4, _padded_normals().tobytes(), dtype="f4")
-        self.texture = ctx.texture((512, self.ROWS), 4, dtype="f4")
+        # Entries without a normal stay zero.
+        self.texture = ctx.texture((512, self.ROWS), 4, bytes(512 * self.ROWS * 16), dtype="f4")
         self._rows = ctx.texture((ROW_DTYPE.itemsize // 16, self.ROWS), 4, dtype="f4")
         self._places = ctx.texture((PLACE_DTYPE.itemsize // 16, self.ROWS), 4, dtype="f4")
         for texture in (self.texture, self._normals, self._rows, self._places):
@@ -87,12 +89,11 @@ class ColormapPass:
         self._target = ctx.framebuffer([self.texture])
         self._corners = ctx.buffer(CORNERS)
         self._spans = InstanceBuffer(ctx, SPAN_DTYPE)
-        self._arrays = {"colormap": self._array("colormap")}
+        self._arrays = {name: self._array(ctx, name) for name in PROGRAMS}
 
-    def _array(self, name: str) -> moderngl.VertexArray:
-        program = load_program(self._ctx, "colormap.vert", f"{name}.frag")
-        layout = [(self._corners, "2f", "corner"), (self._spans.buffer, "2f/i", "span")]
-        return self._ctx.vertex_array(program, layout)
+    def _array(self, ctx: moderngl.Context, name: str) -> moderngl.VertexArray:
+        layout = [(self._corners, "2f", "corner"), (self._spans.buffer, "4f/i", "span")]
+        return ctx.vertex_array(load_program(ctx, "colormap.vert", f"{name}.frag"), layout)
 
     def write(
         self,
@@ -114,19 +115,15 @@ class ColormapPass:
         if surroundings is not None:
             self._upload(self._places, surroundings.places[order], rows["row"], runs)
         ends = [(rows["row"][run[0]], rows["row"][run[-1]] + 1) for run in runs]
-        self._spans.write(np.array(ends, SPAN_DTYPE))
         self._target.use()
         set_state()
-        array = self._lit_by(lights, surroundings)
-        if surroundings is None:
-            show_normals = normals_for is not None
-            viewer = normals_for if show_normals else np.eye(3)
-            set_uniforms(array.program, show_normals=show_normals, view_from_world=viewer)
-        self._normals.use(0)
-        self._rows.use(2)
-        columns = 256 if rows["albedo"][:, 3].all() else 512
-        set_uniforms(array.program, byte_to_normal=0, rows=2, row_count=self.ROWS, columns=columns)
-        array.render(moderngl.TRIANGLE_STRIP, instances=len(runs))
+        folded = bool(rows["albedo"][:, 3].all())
+        for half in (0,) if folded else (0, 256):
+            spans = [((half, first), (half + CODE_COUNT, end)) for first, end in ends]
+            self._spans.write(np.array(spans, SPAN_DTYPE))
+            name = _program_name(surroundings, half == 0, half > 0 or folded)
+            array = self._ready(name, lights, normals_for, surroundings)
+            array.render(moderngl.TRIANGLE_STRIP, instances=len(spans))
 
     def _upload(
         self,
@@ -139,21 +136,32 @@ class ColormapPass:
             place = (0, int(numbers[run[0]]), texture.width, len(run))
             texture.write(records[run[0] : run[-1] + 1].tobytes(), viewport=place)
 
-    def _lit_by(self, lights: LightTable, surroundings: Surroundings | None) -> moderngl.VertexArray:
-        """The cheapest program under these lights, ready but for its rows."""
-        rooms = 0 if surroundings is None else len(surroundings.rooms)
-        name = "colormap" if rooms == 0 else "colormap_room" if rooms == 1 else "colormap_rooms"
-        if name not in self._arrays:
-            self._arrays[name] = self._array(name)
+    def _ready(
+        self,
+        name: str,
+        lights: LightTable,
+        normals_for: NDArray[np.float64] | None,
+        surroundings: Surroundings | None,
+    ) -> moderngl.VertexArray:
+        """A program's vertex array; the program has its uniforms and its textures."""
         program = self._arrays[name].program
+        self._normals.use(0)
         lights.bind(program, unit=1)
-        if surroundings is not None:
+        self._rows.use(2)
+        set_uniforms(program, byte_to_normal=0, rows=2, row_count=self.ROWS)
+        if name == "colormap":
+            viewer = np.eye(3) if normals_for is None else normals_for
+            set_uniforms(program, show_normals=normals_for is not None, view_from_world=viewer)
+        elif surroundings is not None:
             surroundings.rooms.bind(program, 3)
-            _set_reflection(program, surroundings.reflection)
             self._places.use(4)
-            if surroundings.points is not None:
+            if "places" in program:
+                set_uniforms(program, places=4)
+            if surroundings.points is not None and "points" in program:
                 surroundings.points.use(5)
-            set_uniforms(program, places=4, points=5)
+                set_uniforms(program, points=5)
+            if surroundings.reflection is not None and "reflection" in program:
+                _set_reflection(program, surroundings.reflection)
         return self._arrays[name]
 
     def release(self) -> None:
@@ -230,8 +238,18 @@ def _padded_normals() -> NDArray[np.float32]:
     return np.pad(BYTE_TO_NORMAL, ((0, 0), (0, 1))).astype(np.float32)
 
 
-def _set_reflection(program: moderngl.Program, reflection: Reflection | None) -> None:
-    set_uniforms(program, mirrors=int(reflection is not None), metal=0.0 if reflection is None else reflection.metal)
-    if reflection is not None:
-        terms = reflection.strength, reflection.least, reflection.exponent, reflection.roughness
-        set_uniforms(program, reflection=terms, any_power=int(reflection.exponent not in (4, 5)))
+def _program_name(surroundings: Surroundings | None, multiplies: bool, adds: bool) -> str:
+    """The cheapest program for entries that multiply the albedo, or are added, or both."""
+    if surroundings is None:
+        return "colormap"
+    metal = None if surroundings.reflection is None else surroundings.reflection.metal
+    mirrored = metal is not None and ((multiplies and metal > 0) or (adds and metal < 1))
+    if not (multiplies or mirrored):
+        return "colormap"
+    return f"colormap_room{'s' * (len(surroundings.rooms) > 1)}{'_mirrored' * mirrored}"
+
+
+def _set_reflection(program: moderngl.Program, reflection: Reflection) -> None:
+    roughness = max(reflection.roughness, SHARPEST)
+    terms = reflection.strength, reflection.least, reflection.exponent, roughness
+    set_uniforms(program, reflection=terms, metal=reflection.metal, any_power=int(reflection.exponent not in (4, 5)))

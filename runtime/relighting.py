@@ -205,14 +205,23 @@ def due_tiles(shown: Sequence[ShownTiles], lights: LightTable) -> list[NDArray[n
     texels = [tiles.texels for tiles in shown]
     if sum(int(each[which].sum()) for each, which in zip(texels, stale, strict=True)) <= TEXELS_A_FRAME:
         return stale
-    errors = np.concatenate(
-        [lights.change_since(each, tiles.reflection) for each, tiles in zip(versions, shown, strict=True)]
-    )
-    sizes = np.concatenate(texels)
+    errors, sizes = _changes(shown, versions, lights), np.concatenate(texels)
     order = np.argsort(-errors, kind="stable")
     due = errors > LARGEST_ERROR
     due[order] |= (np.cumsum(sizes[order]) <= TEXELS_A_FRAME) & (errors[order] > 0)
     return np.split(due, np.cumsum([len(each) for each in versions])[:-1])
+
+
+def _changes(
+    shown: Sequence[ShownTiles], versions: Sequence[NDArray[np.int64]], lights: LightTable
+) -> NDArray[np.float64]:
+    """`LightTable.change_since` of the versions of all fans together: once for each reflection, not for each fan."""
+    joined, counts = np.concatenate(versions), [len(each) for each in versions]
+    changes = np.empty(len(joined))
+    for reflection in {tiles.reflection for tiles in shown}:
+        which = np.repeat([tiles.reflection == reflection for tiles in shown], counts)
+        changes[which] = lights.change_since(joined[which], reflection)
+    return changes
 
 
 def light_is_everywhere_alike(rooms: Sequence[Room], reflection: Reflection | None) -> bool:

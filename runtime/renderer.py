@@ -30,7 +30,7 @@ from runtime.lights import LightTable, check_lights
 from runtime.lod import FrameClock, LevelOfDetail, Levels, check_same_object
 from runtime.memory import memory_held
 from runtime.meshes import OUTPUTS, MeshBuffers, MeshInstance, MeshPass, check_places
-from runtime.rooms import RoomPass, to_show
+from runtime.rooms import RoomPass, number_of, to_show
 from runtime.shadows import ShadowPass
 from runtime.surfaces import Surface, SurfacePass
 
@@ -159,7 +159,7 @@ class ImpostorRenderer(LightSettings):
         Returns
         -------
         MeshInstance
-            Its `world_from_model` and `reflection` may be changed at any time.
+            Its `world_from_model`, `reflection` and `visible` may be changed at any time.
 
         Raises
         ------
@@ -276,16 +276,30 @@ class ImpostorRenderer(LightSettings):
         """Draw the meshes that `add_mesh` placed; parameters as `draw`."""
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
             self._update_lights(output)
-            self._mesh_pass.draw(state, self._meshes, viewer, self._table, self._room_table, output)
+            self._mesh_pass.draw(state, self._visible_meshes(), viewer, self._table, self._room_table, output)
 
-    def draw_rooms(self, clip_from_view: ArrayLike, view_from_world: ArrayLike) -> None:
-        """Draw the rooms as background, from inside: the first far one as the sky, others as what they are.
+    def draw_rooms(
+        self, clip_from_view: ArrayLike, view_from_world: ArrayLike, rooms: Sequence[Room] | None = None
+    ) -> None:
+        """Draw rooms as background, from inside: the first far one as the sky, others as what they are.
 
         Depth is tested, so that it does not matter what is drawn first, and written where a room has some size.
+
+        Parameters
+        ----------
+        clip_from_view, view_from_world : array_like, (4, 4) float
+        rooms : sequence of Room, optional
+            Those of `rooms` that are to be seen; by default all.
+
+        Raises
+        ------
+        SettingsError
+            A room that is not among `rooms`.
         """
+        numbered = {number_of(self._rooms, room): room for room in (self._rooms if rooms is None else rooms)}
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
             self._room_table.update(self._rooms)
-            self._room_pass.draw(state, self._rooms, self._room_table, viewer)
+            self._room_pass.draw(state, numbered, self._room_table, viewer)
 
     def draw_room_on(
         self,
@@ -359,7 +373,10 @@ class ImpostorRenderer(LightSettings):
             check_type("surface", surface, GroundSurface)
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
             fans = [batch.instances for batch in self._batches]
-            self._shadows.draw(state, fans, self._meshes, viewer, self, ground, surface)
+            self._shadows.draw(state, fans, self._visible_meshes(), viewer, self, ground, surface)
+
+    def _visible_meshes(self) -> list[MeshInstance]:
+        return [mesh for mesh in self._meshes if mesh.visible]
 
     def _buffers_in_use(self) -> dict[int, MeshBuffers]:
         levels = [batch.levels for batch in self._batches if batch.levels is not None]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from impostor.environment.colormap import NORMALS, diffuse_light, mirrored_light
+from impostor.environment.colormap import NORMALS, diffuse_light
 from impostor.environment.cube import face_directions
 from impostor.environment.reflection import Reflection
 from impostor.environment.room import Room
@@ -31,7 +31,7 @@ class RoomLight(NamedTuple):
         """The light of a room."""
         toward, environment = DIRECTIONS @ room.environment_from_world.T, room.environment
         steps = np.linspace(0, 1, len(environment.levels))
-        mirrored = np.stack([mirrored_light(environment, toward, float(roughness)) for roughness in steps])
+        mirrored = np.stack([environment.mirrored(toward, roughness) for roughness in steps])
         diffuse = room.exposure * diffuse_light(environment, toward)
         return cls(_place(room), diffuse, np.minimum(room.exposure * mirrored, 1))
 

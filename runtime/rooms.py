@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import moderngl
 import numpy as np
@@ -16,9 +16,11 @@ from runtime.gl_state import CallerState, set_state
 from runtime.gpu import load_program, set_uniforms
 from runtime.instances import Viewer
 
-ROUNDNESS = {"box": (0, 0, 0), "sphere": (1, 1, 1), "cylinder": (1, 0, 1), "plane": (0, 0, 0)}
+SHOWN_ON = ("box", "sphere", "cylinder", "plane")
 """What a room can be shown on, all within the cube from -1 to 1: the cylinder stands upright between floor and ceiling,
-the plane is the cube's wall toward -z. The numbers say along which axes they are round."""
+the plane is the cube's wall toward -z."""
+ROUNDNESS = {"sphere": (1, 1, 1), "cylinder": (1, 0, 1)}
+"""1 along the axes in which they are round."""
 _SIDES = np.array([[-1, -1], [1, -1], [1, 1], [-1, -1], [1, 1], [-1, 1]], np.float32)
 PLANE = np.insert(_SIDES, 2, -1, axis=1)
 PICTURE = np.insert(_SIDES, 2, 0, axis=1)
@@ -33,22 +35,27 @@ class RoomPass:
     """
 
     def __init__(self, ctx: moderngl.Context):
-        self._shown = load_program(ctx, "room.vert", "room.frag")
-        self._far = load_program(ctx, "room_far.vert", "room_far.frag")
         corners = {"cube": _cube(), "plane": PLANE, "picture": PICTURE}
-        self._buffers = [ctx.buffer(np.ascontiguousarray(each, np.float32)) for each in corners.values()]
-        programs = self._shown, self._shown, self._far
-        self._cube, self._plane, self._picture = (
-            ctx.vertex_array(program, [(buffer, "3f", "corner")])
-            for program, buffer in zip(programs, self._buffers, strict=True)
-        )
+        self._buffers = {name: ctx.buffer(np.ascontiguousarray(each, np.float32)) for name, each in corners.items()}
+        self._far = self._array(ctx, "picture", "room_far.vert", "room_far.frag")
+        flat = "room.vert", "room_flat.frag"
+        round_ = self._array(ctx, "cube", "room.vert", "room_round.frag")
+        self._arrays = {
+            "box": self._array(ctx, "cube", *flat),
+            "plane": self._array(ctx, "plane", *flat),
+            "sphere": round_,
+            "cylinder": round_,
+        }
 
-    def draw(self, state: CallerState, rooms: Sequence[Room], table: RoomTable, viewer: Viewer) -> None:
-        """Draw all rooms that a table holds: the first far one behind everything, others as what they are."""
-        far = [number for number, room in enumerate(rooms) if room.shape == "far"]
+    def _array(self, ctx: moderngl.Context, buffer: str, *shaders: str) -> moderngl.VertexArray:
+        return ctx.vertex_array(load_program(ctx, *shaders), [(self._buffers[buffer], "3f", "corner")])
+
+    def draw(self, state: CallerState, rooms: Mapping[int, Room], table: RoomTable, viewer: Viewer) -> None:
+        """Draw rooms by their numbers in a table: the first far one behind everything, others as what they are."""
+        far = [number for number, room in rooms.items() if room.shape == "far"]
         for number in far[:1]:
             self._draw_far(state, number, table, viewer)
-        for number, room in enumerate(rooms):
+        for number, room in rooms.items():
             if room.shape != "far":
                 assert room.world_from_room is not None
                 self.draw_on(state, number, table, viewer, room.shape, room.world_from_room)
@@ -65,28 +72,50 @@ class RoomPass:
         """Draw a table's room of some number on a shape that stands somewhere; depth is tested and written."""
         state.bind_target()
         set_state(depth_test=True, depth_write=True, cull_back=shape != "plane", background=True)
-        table.bind(self._shown, 0, first=number)
+        array = self._arrays[shape]
+        table.bind(array.program, 0, first=number)
         set_uniforms(
-            self._shown,
+            array.program,
             clip_from_world=viewer.clip_from_world,
             world_from_shape=world_from_shape,
-            shape_from_world=np.linalg.inv(world_from_shape),
             eye=tuple(viewer.eye),
-            roundness=ROUNDNESS[shape],
         )
-        (self._plane if shape == "plane" else self._cube).render(moderngl.TRIANGLES)
+        if shape in ROUNDNESS:
+            inverse = np.linalg.inv(world_from_shape)
+            set_uniforms(array.program, shape_from_world=inverse, roundness=ROUNDNESS[shape])
+        array.render(moderngl.TRIANGLES)
 
     def _draw_far(self, state: CallerState, number: int, table: RoomTable, viewer: Viewer) -> None:
         state.bind_target()
         set_state(depth_test=True, background=True)
-        table.bind(self._far, 0, first=number)
-        set_uniforms(self._far, world_from_clip=np.linalg.inv(viewer.clip_from_world), eye=tuple(viewer.eye))
-        self._picture.render(moderngl.TRIANGLES)
+        program = self._far.program
+        table.bind(program, 0, first=number)
+        set_uniforms(program, world_from_clip=np.linalg.inv(viewer.clip_from_world), eye=tuple(viewer.eye))
+        self._far.render(moderngl.TRIANGLES)
 
     def release(self) -> None:
         """Free everything this pass made."""
-        for resource in (self._cube, self._plane, self._picture, *self._buffers, self._shown, self._far):
-            resource.release()
+        arrays = {id(array): array for array in (*self._arrays.values(), self._far)}
+        for array in arrays.values():
+            program = array.program
+            array.release()
+            program.release()
+        for buffer in self._buffers.values():
+            buffer.release()
+
+
+def number_of(rooms: Sequence[Room], room: Room) -> int:
+    """A room's place among others.
+
+    Raises
+    ------
+    SettingsError
+        A room that is none of them.
+    """
+    number = next((number for number, each in enumerate(rooms) if each is room), None)
+    if number is None:
+        raise SettingsError("room", "is not among the renderer's rooms; expected one of them")
+    return number
 
 
 def to_show(
@@ -97,13 +126,11 @@ def to_show(
     Raises
     ------
     SettingsError
-        A room that is none of them, another shape than those of ROUNDNESS, a matrix without an inverse.
+        A room that is none of them, another shape than those of SHOWN_ON, a matrix without an inverse.
     """
-    number = next((number for number, each in enumerate(rooms) if each is room), None)
-    if number is None:
-        raise SettingsError("room", "is not among the renderer's rooms; expected one of them")
-    if shape not in ROUNDNESS:
-        raise SettingsError("room", f"shown on {shape!r}; expected one of {', '.join(ROUNDNESS)}")
+    number = number_of(rooms, room)
+    if shape not in SHOWN_ON:
+        raise SettingsError("room", f"shown on {shape!r}; expected one of {', '.join(SHOWN_ON)}")
     given = room.world_from_room if world_from_shape is None else world_from_shape
     matrix = numbers("room", "world_from_shape", np.eye(4) if given is None else given, (4, 4))
     if not abs(np.linalg.det(matrix)) > 0:

@@ -11,22 +11,13 @@ from impostor.shadow_projection import Ground
 from runtime.gpu import InstanceBuffer, load_program, set_uniforms
 from runtime.meshes import COPY_DTYPE, MeshCopies, draw_parts
 from runtime.shadow_bounds import box_corners
-from runtime.soft_light import COUNTS, MOST_POINTS, source_points, step_at_metre
-
-MOST_TRIANGLES = 1_500_000
-"""Of one copy from all points of a light; a larger mesh casts from fewer points, and its penumbra is blurred more."""
+from runtime.soft_light import MOST_POINTS, source_points, step_at_metre
 
 
 def mesh_corners(meshes: MeshCopies) -> NDArray[np.float64]:
     """World-space corners (N, 8, 3) of the copies' bounding boxes."""
     corners, matrices = box_corners(*meshes.buffers.model.bounds), meshes.world_from_model
     return corners @ matrices[:, :3, :3].swapaxes(1, 2) + matrices[:, None, :3, 3]
-
-
-def most_points(meshes: MeshCopies) -> int:
-    """From how many points of a source each copy of a mesh casts at most, one of `COUNTS`."""
-    affordable = MOST_TRIANGLES // max(meshes.buffers.triangle_count, 1)
-    return int(COUNTS[max(np.searchsorted(COUNTS, affordable, side="right") - 1, 1)])
 
 
 class MeshShadowPass:

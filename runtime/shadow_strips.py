@@ -22,6 +22,7 @@ CASTER_DTYPE = np.dtype([("position_scale", "f4", (4,)), ("turn", "f4", (2,)), (
 SOFT_DTYPE = np.dtype([*CASTER_DTYPE.descr, ("toward_light", "f4", (3,)), ("step", "f4"), ("points", "u4")])
 # Strips are cut from silhouettes whose texels are at most this large on screen.
 LARGEST_TEXEL = 1.0  # pixels
+SOFTENED_TEXEL = 2.0  # pixels, where many shadows of it are averaged
 COARSEST_SIDE = 8  # texels
 
 
@@ -61,14 +62,17 @@ class CastingFan:
         turned = np.einsum("nij,kj->nki", rotation, box_corners(*self.instances.fan.bounds))
         return self.instances.positions[self.seen.index][:, None] + self.seen.scale[:, None, None] * turned
 
-    def levels(self, stretch: float) -> NDArray[np.intp]:
-        """How often (N,) each silhouette may be halved, where the light lengthens shadows `stretch` times."""
+    def levels(self, stretch: float, largest: float) -> NDArray[np.intp]:
+        """How often (N,) each silhouette may be halved to texels of so many pixels.
+
+        `stretch` is how much the light lengthens shadows.
+        """
         size, most = self.instances.fan.size, 0
         while size >> most + 1 >= COARSEST_SIDE and size % (1 << most + 1) == 0:
             most += 1
         # What is behind the camera may cast its shadow right before it.
-        on_screen = np.where(self.pixels_per_texel > 0, self.pixels_per_texel * stretch, LARGEST_TEXEL)
-        return np.clip(np.floor(np.log2(LARGEST_TEXEL / on_screen)), 0, most).astype(np.intp)
+        on_screen = np.where(self.pixels_per_texel > 0, self.pixels_per_texel * stretch, largest)
+        return np.clip(np.floor(np.log2(largest / on_screen)), 0, most).astype(np.intp)
 
 
 class StripPass:
@@ -94,7 +98,7 @@ class StripPass:
 
     def draw(self, fan: CastingFan, chosen: NDArray[np.intp], light: DirectionalLight, ground: Ground) -> None:
         """Draw the strips of some copies, one draw call for all that show the light the same view."""
-        keys = _strip_keys(fan, chosen, np.array(light.toward), ground)
+        keys = _strip_keys(fan, chosen, np.array(light.toward), ground, LARGEST_TEXEL)
         self._draw_each(fan.instances.fan, keys, fan.records[chosen], soft=False)
 
     def draw_soft(
@@ -114,7 +118,7 @@ class StripPass:
         for count in np.unique(counts).tolist():
             copies, step = chosen[counts == count], pixels * step_at_metre(light, ground, count)
             for toward, bits in zip(source_points(light, ground, count), point_bits(count), strict=True):
-                keys.append(_strip_keys(fan, copies, toward, ground))
+                keys.append(_strip_keys(fan, copies, toward, ground, SOFTENED_TEXEL))
                 record = np.zeros(len(copies), SOFT_DTYPE)
                 for name in CASTER_DTYPE.names or ():
                     record[name] = fan.records[name][copies]
@@ -196,12 +200,12 @@ class _Strips:
 
 
 def _strip_keys(
-    fan: CastingFan, chosen: NDArray[np.intp], toward: NDArray[np.float64], ground: Ground
+    fan: CastingFan, chosen: NDArray[np.intp], toward: NDArray[np.float64], ground: Ground, largest: float
 ) -> NDArray[np.intp]:
     """Which strips some copies cast toward a light: the nearest view in the upper bits, its level below."""
     toward = toward / np.linalg.norm(toward)
     views, _ = nearest_views(fan.instances, np.append(toward, 0.0), fan.seen.index[chosen])
-    return views << 8 | fan.levels(1 / float(ground.normal @ toward))[chosen]
+    return views << 8 | fan.levels(1 / float(ground.normal @ toward), largest)[chosen]
 
 
 def _halved(

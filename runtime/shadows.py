@@ -28,9 +28,9 @@ from runtime.light_settings import LightSettings
 from runtime.meshes import MeshCopies, MeshInstance
 from runtime.relight import CORNERS
 from runtime.shadow_bounds import CELL, covered_cells, in_view, shadow_hulls
-from runtime.shadow_meshes import MeshShadowPass, mesh_corners, most_points
+from runtime.shadow_meshes import MeshShadowPass, mesh_corners
 from runtime.shadow_strips import CastingFan, StripPass
-from runtime.soft_light import MOST_POINTS, penumbra_pixels, points_needed, source_rim
+from runtime.soft_light import penumbra_pixels, points_affordable, points_needed, source_rim
 from runtime.soft_shadows import Mask, SoftMarks
 
 CHANNELS = 4
@@ -46,7 +46,8 @@ class _Group(NamedTuple):
     copies: Any
     corners: NDArray[np.float64]
     clip_from_shadow: NDArray[np.float64]
-    most_points: int
+    triangles: int
+    """Of one copy; 0 where they do not count."""
 
 
 class _Mark(NamedTuple):
@@ -78,9 +79,10 @@ class ShadowPass:
         self._corners, self._cells = ctx.buffer(CORNERS), InstanceBuffer(ctx, CELL_DTYPE)
         self._soft_marks = SoftMarks(ctx, self._corners, self._cells.buffer)
         cells = [(self._corners, "2f", "corner"), (self._cells.buffer, "2f/i", "cell")]
-        names = ("shadow_darken.frag", "shadow_darken_many.frag")
+        names = ("shadow_darken.frag", "shadow_darken_fading.frag", "shadow_darken_many.frag")
         self._darken_programs = [load_program(ctx, "shadow_darken.vert", name) for name in names]
-        self._few_lights, self._many_lights = (ctx.vertex_array(program, cells) for program in self._darken_programs)
+        arrays = (ctx.vertex_array(program, cells) for program in self._darken_programs)
+        self._few_lights, self._fading, self._many_lights = arrays
         self._marks: moderngl.Texture | None = None
         self._target: moderngl.Framebuffer | None = None
         self._frame: tuple[object, ...] | None = None
@@ -132,11 +134,11 @@ class ShadowPass:
     def _groups(self, fans: Sequence[CastingFan], meshes: Sequence[MeshCopies], viewer: Viewer) -> list[_Group]:
         clip = viewer.clip_from_world
         return [
+            *(_Group(self._strips, fan, fan.corners(), clip @ fan.records["rows"].astype(float), 0) for fan in fans),
             *(
-                _Group(self._strips, fan, fan.corners(), clip @ fan.records["rows"].astype(float), MOST_POINTS)
-                for fan in fans
+                _Group(self._meshes, mesh, mesh_corners(mesh), clip[None], mesh.buffers.triangle_count)
+                for mesh in meshes
             ),
-            *(_Group(self._meshes, mesh, mesh_corners(mesh), clip[None], most_points(mesh)) for mesh in meshes),
         ]
 
     def _mark(self, groups: Sequence[_Group], viewer: Viewer, marks: Sequence[_Mark], ground: Ground) -> None:
@@ -198,12 +200,30 @@ class ShadowPass:
             chosen = np.flatnonzero(in_view(hull))
             if len(chosen):
                 penumbra = penumbra_pixels(group.corners[chosen], light, ground, viewer)
-                points = points_needed(penumbra, float(mark.share.max()), group.most_points)
+                most = points_affordable(group.triangles * len(chosen))
+                points = points_needed(penumbra, float(mark.share.max()), most)
                 casting.append((group, chosen, points, hull[chosen]))
-        if all((points == 1).all() for _, _, points, _ in casting):
-            for group, chosen, _, _ in casting:
-                group.draws.draw(group.copies, chosen, light, ground)
-            return [hull for *_, hull in casting]
+        soft = [
+            (group, chosen[points > 1], points[points > 1], hull[points > 1]) for group, chosen, points, hull in casting
+        ]
+        soft = [each for each in soft if len(each[1])]
+        if soft:
+            self._resolve_soft(soft, viewer, light, ground, first_row, channel)
+        for group, chosen, points, _ in casting:
+            if (points == 1).any():
+                group.draws.draw(group.copies, chosen[points == 1], light, ground)
+        return [hull for *_, hull in casting]
+
+    def _resolve_soft(
+        self,
+        casting: Sequence[tuple[_Group, NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]],
+        viewer: Viewer,
+        light: DirectionalLight,
+        ground: Ground,
+        first_row: int,
+        channel: Mask,
+    ) -> None:
+        """Draw copies that cast from several points each: groups, which copies, from how many, and their hulls."""
         width, height = _size(viewer)
         self._soft_marks.begin(width + 1, height + 1)
         pixels = height / 2 * abs(viewer.clip_from_view[1, 1])
@@ -212,11 +232,9 @@ class ShadowPass:
             group.draws.draw_soft(group.copies, chosen, light, ground, points, pixels)
         assert self._target is not None
         self._target.use()
-        hulls = [hull for *_, hull in casting]
-        count = self._write_cells(hulls, width, height)
+        count = self._write_cells([hull for *_, hull in casting], width, height)
         squash = abs(float(viewer.view_from_world[2, :3] @ ground.normal))
         self._soft_marks.resolve(channel, first_row, count, squash)
-        return hulls
 
     def _write_cells(self, hulls: Sequence[NDArray[np.float64]], width: int, height: int) -> int:
         """Upload the cells of the picture that shadows may touch; gives their number."""
@@ -238,15 +256,17 @@ class ShadowPass:
         set_state(depth_test=True, blend=(ZERO, SOURCE_COLOR), polygon_offset=(-1.0, -4.0))
         self._marks.use(0)
         width, height = _size(viewer)
-        array, room = (self._few_lights, CHANNELS) if len(marks) <= CHANNELS else (self._many_lights, MOST_LIGHTS)
-        if array is self._many_lights:
+        array, room = self._few_lights if surface is None else self._fading, CHANNELS
+        if len(marks) > CHANNELS:
+            array, room = self._many_lights, MOST_LIGHTS
             set_uniforms(array.program, pictures=-(-len(marks) // CHANNELS), rows=height + 1)
+        if array is not self._few_lights:
+            set_uniforms(array.program, **_fading(viewer, ground, surface))
         shares = np.array([mark.share for mark in marks])
         set_uniforms(
             array.program,
             # Depth of the ground is linear in x and y on the screen.
             ground_depth=tuple(-plane[[0, 1, 3]] / plane[2]),
-            **_fading(viewer, ground, surface),
             cell_size=(2 * CELL / width, 2 * CELL / height),
             marks=0,
             mark_origin=viewer.viewport[:2],
@@ -287,7 +307,8 @@ class ShadowPass:
         """Free everything this pass made."""
         self._release_target()
         parts = self._strips, self._meshes, self._contacts, self._soft_marks
-        for part in (*parts, self._few_lights, self._many_lights, self._corners, self._cells, *self._darken_programs):
+        arrays = self._few_lights, self._fading, self._many_lights
+        for part in (*parts, *arrays, self._corners, self._cells, *self._darken_programs):
             part.release()
 
 
@@ -300,7 +321,7 @@ def _channel_mask(channel: int) -> Mask:
 
 
 def _fading(viewer: Viewer, ground: Ground, surface: GroundSurface | None) -> dict[str, Any]:
-    """Uniforms of `shadow_marks.glsl`; without a surface every place is its middle."""
+    """Uniforms of `shadow_fade.glsl`; without a surface every place is its middle."""
     if surface is None:
         return {"metres_from_screen": np.diag([0.0, 0.0, 1.0]), "fade": (1.0, 2.0)}
     return {"metres_from_screen": metres_from_screen(viewer, ground, surface), "fade": surface.fade}

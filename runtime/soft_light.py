@@ -16,6 +16,8 @@ COUNTS = np.array([1, 4, 6, 8, 12, 24])
 MOST_POINTS = 24
 WIDEST_STEP = 5.0  # pixels of penumbra to a point
 SMALLEST_STEP = 0.02  # of the ground's light: an edge that is not seen once it is blurred
+MOST_TRIANGLES = 1_500_000
+"""Of the copies of a mesh for one light; more cast from fewer points, whose shadows are blurred more."""
 HARD = 1.0  # pixels; a narrower penumbra is none
 RIM = 1.3  # radii
 BEHIND = 1e9  # pixels that a metre behind the eye counts as
@@ -28,8 +30,8 @@ def source_points(light: DirectionalLight, ground: Ground, count: int) -> NDArra
     Returns
     -------
     ndarray, (count, 3) float64
-        Of unequal length. All are at least `LOWEST_LIGHT` over the ground: the disc of a light that touches the horizon
-        is what of it stands above.
+        Of unequal length. All are at least `LOWEST_LIGHT` over the ground: what of the disc would reach below the
+        horizon is pressed together above it.
 
     References
     ----------
@@ -47,6 +49,11 @@ def source_rim(light: DirectionalLight, ground: Ground) -> list[DirectionalLight
     wider = replace(light, softness=float(np.arctan(RIM * np.tan(light.softness))))
     corners = _toward(wider, ground, np.array([-1, 1, -1, 1]), np.array([-1, -1, 1, 1]))
     return [DirectionalLight((x, y, z)) for x, y, z in corners.tolist()]
+
+
+def points_affordable(triangles: int) -> int:
+    """From how many points of a source so many triangles cast at most, one of `COUNTS`."""
+    return int(COUNTS[max(np.searchsorted(COUNTS, MOST_TRIANGLES // max(triangles, 1), side="right") - 1, 1)])
 
 
 def points_needed(penumbra: NDArray[np.float64], share: float, most: int = MOST_POINTS) -> NDArray[np.intp]:
@@ -104,5 +111,5 @@ def _toward(
     climb = abs(float(ground.normal @ rising))
     rising *= np.sign(ground.normal @ rising) or 1.0
     low = min(reach, (float(ground.normal @ toward) - LOWEST_LIGHT) / max(climb, 1e-9))
-    offset = (reach - low) / 2 + (reach + low) / 2 * np.asarray(up)
-    return toward + reach * np.asarray(across)[:, None] * level + offset[:, None] * rising
+    offset = np.where(up > 0, reach, low) * up
+    return toward + reach * across[:, None] * level + offset[:, None] * rising

@@ -21,6 +21,7 @@ from impostor.srgb import srgb_from_linear
 from runtime.assets import Assets, Shelf
 from runtime.cameras import Camera
 from runtime.canvas import Canvas
+from runtime.contact_shadows import ContactShadows
 from runtime.gl_state import preserved_state
 from runtime.instances import Instances, Viewer, quads_toward
 from runtime.lod import LevelOfDetail
@@ -199,6 +200,8 @@ class Stage:
         lit = view in ("lit", "depth")
         renderer.lights, renderer.ambient = (self._lights, self._ambient) if lit else ((), 1.0)
         renderer.shadow_lights = self.scene.shadow_lights
+        contact = self.scene.contact_shadow
+        renderer.contact_shadows = ContactShadows(contact) if contact > 0 else None
         if lit and self._rooms.uncaptured:
             self._capture_rooms()
         renderer.rooms = self._rooms.all if lit else ()
@@ -226,7 +229,7 @@ class Stage:
         if any(room.shape == "far" for room in self._rooms.visible):
             background = UNSEEN
         surface = ground_surface(ground, self._ground_texture, camera, background, output)
-        if ground.ptm is None:
+        if ground.ptm is None and ground.visible:
             renderer.draw_ground(*matrices, ground.plane, surface)
         if shadows:
             renderer.draw_shadows(*matrices, ground.plane, surface if ground.ptm is None else None)
@@ -382,7 +385,7 @@ class Stage:
         return wanted
 
     def _wanted_floor(self, ground: SceneGround | None) -> Mapping[Hashable, Callable[[], Surface]]:
-        if ground is None or ground.ptm is None:
+        if ground is None or ground.ptm is None or not ground.visible:
             return {}
         ptm = self._assets.ptm(ground.ptm)
         return {(ground, id(ptm)): partial(self._add_floor, ground, ptm)}

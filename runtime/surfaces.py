@@ -79,7 +79,16 @@ class Surface:
 
 
 def rectangle(width: float, height: float) -> Model:
-    """A rectangle around the origin that faces +Z, as wide and as high as a whole picture; metres."""
+    """A rectangle around the origin that faces +Z, as wide and as high as a whole picture; metres.
+
+    Raises
+    ------
+    SettingsError
+        A side that is not finite or not above 0.
+    """
+    sides = numbers("rectangle", "width and height", (width, height), (2,))
+    if not (sides > 0).all():
+        raise SettingsError("rectangle", f"{width:g} x {height:g} m; expected two numbers above 0")
     corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * (width / 2, height / 2, 1)
     uvs = np.array([[0, 1], [1, 1], [1, 0], [0, 0]])
     normals = np.tile((0.0, 0.0, 1.0), (4, 1))

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from impostor.environment.convolution import convolved
+from impostor.environment.convolution import Lobe, convolved
 from impostor.environment.cube import face_directions, padded, reduced, solid_angles
 from impostor.environment.environment import Environment
 from impostor.environment.room import Room
@@ -38,7 +37,7 @@ def brightest_direction(environment: Environment) -> NDArray[np.float64]:
     ----------
     Bjorke, "Image-Based Lighting", GPU Gems 19, section 19.5: shadows may fall from the brightest area.
     """
-    (blurred,) = convolved(environment.faces, [partial(_bell, deviation=AREA)], [2 * CELLS], [DEGREE])
+    (blurred,) = convolved(environment.faces, [_bell(AREA, environment)], [2 * CELLS], [DEGREE])
     return face_directions(2 * CELLS).reshape(-1, 3)[(blurred @ LUMINANCE).argmax()]
 
 
@@ -83,7 +82,7 @@ def bright_lights(source: Room | Environment, count: int) -> list[DirectionalLig
 
 def _sources(environment: Environment, cells: int) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.bool_]]]:
     """Parts of a map that stand out, and what is around each: masks of all cells; the parts do not overlap."""
-    lobes = [partial(_bell, deviation=deviation) for deviation in (NARROW, WIDE)]
+    lobes = [_bell(deviation, environment) for deviation in (NARROW, WIDE)]
     narrow, wide = (
         (means @ LUMINANCE).ravel() for means in convolved(environment.faces, lobes, [cells, cells], [DEGREE, DEGREE])
     )
@@ -94,22 +93,33 @@ def _sources(environment: Environment, cells: int) -> Iterator[tuple[NDArray[np.
     for peak in peaks[np.argsort(-contrast[peaks], kind="stable")][:MOST_SOURCES]:
         if taken[peak]:
             continue
-        allowed = (contrast > contrast[peak] / 2) & ~taken
-        inside = np.zeros_like(taken)
-        inside[peak] = True
-        while (grown := inside[neighbours].any(axis=1) & allowed).sum() > inside.sum():
-            inside = grown
+        inside = _flooded(int(peak), (contrast > contrast[peak] / 2) & ~taken, neighbours)
         # The edge of a source lies in the cells next to those that stand out.
-        inside = inside[neighbours].any(axis=1) & ~taken
+        inside = _grown(inside, neighbours) & ~taken
         taken |= inside
-        around = inside[neighbours].any(axis=1)
-        around = around[neighbours].any(axis=1) & ~inside
+        around = _grown(_grown(inside, neighbours), neighbours) & ~inside
         if around.any():
             yield inside, around
 
 
+def _flooded(start: int, allowed: NDArray[np.bool_], neighbours: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """The cells that can be reached from one over allowed ones."""
+    inside = np.zeros_like(allowed)
+    inside[start] = True
+    while True:
+        grown = _grown(inside, neighbours) & allowed
+        if grown.sum() <= inside.sum():
+            return inside
+        inside = grown
+
+
+def _grown(cells: NDArray[np.bool_], neighbours: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Cells and those next to them."""
+    return np.asarray(cells[neighbours].any(axis=1))
+
+
 def _light(
-    room: Room, beyond: NDArray[np.float64], toward: NDArray[np.float64], angles: NDArray[np.float64]
+    room: Room, beyond: NDArray[np.floating], toward: NDArray[np.floating], angles: NDArray[np.floating]
 ) -> DirectionalLight | None:
     """The light that texels (K,) of a room give beyond their surroundings, or None."""
     shine = np.maximum(beyond @ LUMINANCE, 0)
@@ -128,19 +138,20 @@ def _light(
     return DirectionalLight((x, y, z), (red, green, blue), softness)
 
 
-def _in_world(room: Room, direction: NDArray[np.float64]) -> NDArray[np.float64]:
+def _in_world(room: Room, direction: NDArray[np.floating]) -> NDArray[np.floating]:
     """From the environment's axes to the world's, of any length but 0."""
     if room.shape == "far":
         return room.environment_from_world.T @ direction
     return np.asarray(room.world_from_room)[:3, :3] @ np.linalg.solve(room.environment_from_room, direction)
 
 
-def _bell(angles: NDArray[np.float64], deviation: float) -> NDArray[np.float64]:
-    """The sphere's normal distribution, von Mises and Fisher's."""
-    return np.exp((np.cos(angles) - 1) / deviation**2)
+def _bell(deviation: float, environment: Environment) -> Lobe:
+    """The sphere's normal distribution, von Mises and Fisher's, of at least the width that hides the texels."""
+    deviation = max(deviation, 0.75 * np.pi / 2 / environment.size)
+    return lambda angles: np.exp((np.cos(angles) - 1) / deviation**2)
 
 
-def _by_cell(texels: NDArray[np.float64], cells: int) -> NDArray[np.float64]:
+def _by_cell(texels: NDArray[np.floating], cells: int) -> NDArray[np.floating]:
     """(6, N, N, C) to (6 * cells * cells, texels of a cell, C)."""
     many = texels.shape[1] // cells
     split = texels.reshape(6, cells, many, cells, many, -1).swapaxes(2, 3)

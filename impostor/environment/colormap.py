@@ -20,8 +20,11 @@ from impostor.normal_code import BYTE_TO_NORMAL, CODE_COUNT
 NORMALS = BYTE_TO_NORMAL[:CODE_COUNT].astype(np.float64)
 REFLECTED = 2 * NORMALS[:, 2:] * NORMALS - [0, 0, 1]
 """(225, 3): where an eye infinitely far away looks by way of each normal, view space."""
+SHARPEST = 0.1
+"""The least roughness with which a fan mirrors, because the directions that its codes mirror lie far apart: sharper,
+mirrors of real models are 0.3 to 2 dB farther from the mesh."""
 ROUND = 0.3  # parts of the radius from the middle at which a surface is expected that a view shows nothing of
-_PADDED: WeakKeyDictionary[Environment, dict[int, NDArray[np.float32]]] = WeakKeyDictionary()
+_PADDED: WeakKeyDictionary[Environment, NDArray[np.float32]] = WeakKeyDictionary()
 SHORT_OF_WALL = 0.999  # of the way from a room's middle to its wall, how far a point reaches that would lie beyond
 
 
@@ -102,27 +105,10 @@ def surface_points(fan: Fan) -> NDArray[np.float32]:
 
 
 def diffuse_light(environment: Environment, normals: ArrayLike) -> NDArray[np.float32]:
-    """`Environment.diffuse` at normals (..., 3) of any length."""
-    return sample_padded(_padded(environment, -1), normals)
-
-
-def mirrored_light(environment: Environment, directions: ArrayLike, roughness: float) -> NDArray[np.float32]:
-    """`Environment.mirrored` at directions (..., 3), for one roughness and again and again."""
-    last = len(environment.levels) - 1
-    below = min(int(roughness * last), max(last - 1, 0))
-    part = roughness * last - below
-    light = sample_padded(_padded(environment, below), directions)
-    if part > 0:
-        light = (1 - part) * light + part * sample_padded(_padded(environment, below + 1), directions)
-    return light
-
-
-def _padded(environment: Environment, level: int) -> NDArray[np.float32]:
-    """A level's faces, or with -1 those of the diffuse light, ready for look-ups."""
-    kept = _PADDED.setdefault(environment, {})
-    if level not in kept:
-        kept[level] = padded(environment.diffuse if level < 0 else environment.levels[level])
-    return kept[level]
+    """`Environment.diffuse` at normals (..., 3) of any length, quickly again and again."""
+    if environment not in _PADDED:
+        _PADDED[environment] = padded(environment.diffuse)
+    return sample_padded(_PADDED[environment], normals)
 
 
 def _diffuse(normals: NDArray[np.float64], centers: NDArray[np.float64], rooms: Sequence[Room]) -> NDArray[np.float64]:
@@ -143,14 +129,14 @@ def _mirrored(
     reflection: Reflection,
 ) -> NDArray[np.float64]:
     """Light (..., 225, 3) from directions (..., 225, 3) of the world, mirrored beside the centres (..., 3)."""
-    chosen = mirrored_room(rooms, centers)
+    chosen, roughness = mirrored_room(rooms, centers), max(reflection.roughness, SHARPEST)
     light = np.zeros(directions.shape)
     for number, room in enumerate(rooms):
         here = chosen == number
         if np.any(here):
             points = _kept_inside(room, centers[here], offsets[here])
             toward, inside = room.directions_toward(points, directions[here])
-            seen = room.exposure * mirrored_light(room.environment, toward, reflection.roughness)
+            seen = room.exposure * room.environment.mirrored(toward, roughness)
             seen = reflection.fresnel(NORMALS[:, 2])[:, None] * seen
             light[here] = np.where(inside[..., None], seen, room.outside)
     return light

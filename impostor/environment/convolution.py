@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from impostor.environment.cube import face_directions, reduced
 
-Lobe = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+Lobe = Callable[[NDArray[np.floating]], NDArray[np.floating]]
 """From angles away from its middle, radians, to weights of any scale."""
 
+ROWS_PER_DEGREE = 4
 ORDERS_AT_ONCE = 32
 PROFILE_STEPS = 4096
 
@@ -38,18 +39,18 @@ def convolved(
     Notes
     -----
     A convolution with a round lobe multiplies all harmonics of one degree by one number. Light is spread over a grid of
-    directions, two for each half wave of the finest harmonic, so that each texel keeps its energy and its place.
+    directions, many for each wave of the finest harmonic, so that each texel keeps its energy and its place.
 
     References
     ----------
     Driscoll, Healy, "Computing Fourier Transforms and Convolutions on the 2-Sphere", 1994, theorem 1.
     """
-    grid = _spread(faces, rows=2 * (max(degrees) + 1))
+    grid = _spread(faces, rows=ROWS_PER_DEGREE * max(degrees))
     grids = _convolved_grids(grid, _factors(lobes, degrees), np.asarray(degrees))
     low, high = faces.min(axis=(0, 1, 2)), faces.max(axis=(0, 1, 2))
     return [
-        np.stack([np.clip(_from_grid(grid, toward), low, high) for toward in face_directions(size)])
-        for grid, size in zip(grids, sizes, strict=True)
+        np.stack([np.clip(_from_bordered(grid, toward), low, high) for toward in face_directions(size)])
+        for grid, size in zip(map(_bordered, grids), sizes, strict=True)
     ]
 
 
@@ -67,6 +68,7 @@ def _spread(faces: NDArray[np.float32], rows: int) -> NDArray[np.float64]:
         for channel in range(3):
             grid[channel] += np.bincount(cell, weight * light[..., channel].ravel(), grid.shape[1])
     grid = grid.reshape(3, rows + 2, 2 * rows + 1).transpose(1, 2, 0)
+    # What fell into the border belongs to the texels that `_bordered` copies there.
     grid[:, 0] += grid[:, -1]
     grid = grid[:, :-1]
     grid[1] += np.roll(grid[0], rows, axis=0)
@@ -74,20 +76,23 @@ def _spread(faces: NDArray[np.float32], rows: int) -> NDArray[np.float64]:
     return grid[1:-1]
 
 
-def _from_grid(grid: NDArray[np.floating], directions: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Bilinear look-up in a grid of directions (rows, 2 * rows, 3)."""
+def _bordered(grid: NDArray[np.floating]) -> NDArray[np.floating]:
+    """A grid of directions with what lies beyond its poles and its last column, (rows + 2, 2 * rows + 1, 3)."""
     rows = grid.shape[0]
-    row, column, down, right = _places(directions, rows)
-    down, right = down[..., None], right[..., None]
-    # Beyond a pole the rows go on at the other side of it.
     grid = np.concatenate([np.roll(grid[:1], rows, axis=1), grid, np.roll(grid[-1:], rows, axis=1)])
-    grid = np.concatenate([grid, grid[:, :1]], axis=1)
+    return np.concatenate([grid, grid[:, :1]], axis=1)
+
+
+def _from_bordered(grid: NDArray[np.floating], directions: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Bilinear look-up in a bordered grid of directions."""
+    row, column, down, right = _places(directions, grid.shape[0] - 2)
+    down, right = down[..., None], right[..., None]
     upper = grid[row, column] * (1 - right) + grid[row, column + 1] * right
     lower = grid[row + 1, column] * (1 - right) + grid[row + 1, column + 1] * right
     return (upper * (1 - down) + lower * down).astype(np.float32)
 
 
-def _places(directions: NDArray[np.float64], rows: int):
+def _places(directions: NDArray[np.floating], rows: int):
     """Row and column of the upper left of the four nearest directions of a grid with a border, and the way on."""
     x, y, z = np.moveaxis(directions, -1, 0)
     down = np.arctan2(np.hypot(x, z), y) * (rows / np.pi) + 0.5
@@ -111,13 +116,13 @@ def _factors(lobes: Sequence[Lobe], degrees: Sequence[int]) -> NDArray[np.float6
 
 def _convolved_grids(
     grid: NDArray[np.float64], factors: NDArray[np.float64], degrees: NDArray[np.intp]
-) -> NDArray[np.float64]:
-    """Light times solid angle to weighted means under every lobe, (lobes, rows, 2 * rows, 3) float64."""
+) -> list[NDArray[np.float32]]:
+    """Light times solid angle to weighted means under every lobe, (rows, 2 * rows, 3) float32 each."""
     rows, (orders, lobes) = grid.shape[0], factors.shape
     half = rows // 2
     waves = np.fft.rfft(grid, axis=1)[:, :orders].swapaxes(0, 1)
     north, south = np.ascontiguousarray(waves[:, :half]), np.ascontiguousarray(waves[:, : half - 1 : -1])
-    out = np.zeros((orders, rows, lobes, 3), np.complex128)
+    out = np.zeros((lobes, orders, rows, 3), np.complex128)
     x = np.cos((np.arange(half) + 0.5) * (np.pi / rows))
     for order, polynomials in _legendre(orders - 1, x):
         has = np.flatnonzero(degrees >= order)
@@ -126,11 +131,12 @@ def _convolved_grids(
             sign, part = 1 - 2 * odd, polynomials[odd::2]
             harmonics = part @ (north[order] + sign * south[order]).view(np.float64)
             lobed = factors[order + odd :: 2, has, None] * harmonics[:, None]
-            wave = (part.T @ lobed.reshape(len(part), len(has) * 6)).view(np.complex128).reshape(half, len(has), 3)
-            out[order, :half, has] += wave.swapaxes(0, 1)
-            out[order, half:, has] += sign * wave[::-1].swapaxes(0, 1)
-    means = np.fft.irfft(out, 2 * rows, axis=0) * (2 * rows)
-    return means.transpose(2, 1, 0, 3)
+            wave = (part.T @ lobed.reshape(len(part), len(has) * 6)).view(np.complex128)
+            wave = wave.reshape(half, len(has), 3).swapaxes(0, 1)
+            out[has, order, :half] += wave
+            out[has, order, half:] += sign * wave[:, ::-1]
+    means = (np.fft.irfft(each, 2 * rows, axis=0) * (2 * rows) for each in out)
+    return [np.ascontiguousarray(each.swapaxes(0, 1), np.float32) for each in means]
 
 
 def _legendre(degree: int, x: NDArray[np.float64]) -> Iterator[tuple[int, NDArray[np.float64]]]:

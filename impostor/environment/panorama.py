@@ -51,14 +51,14 @@ def faces_from_panorama(panorama: NDArray[np.floating], size: int | None = None)
 
     Notes
     -----
-    The integral over the sphere is kept but for rounding, unless the faces are much finer than the panorama: that is
-    made finer first, bilinearly.
+    The integral over the sphere is kept but for rounding. A panorama that is coarser than the faces is made finer
+    first.
     """
     height, width = panorama.shape[:2]
     if width != 2 * height:
         raise SettingsError("panorama", f"is {width}x{height}; expected twice as wide as high")
     size = default_size(width / 4) if size is None else size
-    panorama = _quartered(_enlarged(panorama, max(round(4 * size / width), 1)))
+    panorama = _quartered(_enlarged(panorama, max(int(np.ceil(4 * size / width - 0.1)), 1)))
     half, pieces = size // 2, _pieces(size, len(panorama))
     faces = np.empty((6, size, size, 3))
     for strip, (cap, right, left) in zip(_strips(panorama), _quarters(faces), strict=True):
@@ -102,13 +102,10 @@ def resized_faces(faces: NDArray[np.floating], size: int) -> NDArray[np.float32]
         return np.asarray(faces, np.float32)
     if size >= 1.5 * old:
         return sample(np.asarray(faces, np.float32), face_directions(size))
-    edges, starts = np.arange(size + 1) * (old / size), np.arange(old)
-    common = np.minimum(edges[1:, None], starts + 1) - np.maximum(edges[:-1, None], starts)
-    share = np.clip(common, 0, None)
-    angles = solid_angles(old)
-    light = share @ (faces * angles[..., None]).reshape(6, old, -1)
-    light = (share @ light.reshape(6, size, old, 3)) / (share @ angles @ share.T)[..., None]
-    return light.astype(np.float32)
+    angles = solid_angles(old)[..., None]
+    light = _binned(_binned(faces * angles, size, 1), size, 2)
+    light /= _binned(_binned(angles, size, 0), size, 1)
+    return np.maximum(light, 0).astype(np.float32)
 
 
 def flipped_faces(faces: NDArray[np.float32], axis: str) -> NDArray[np.float32]:
@@ -138,18 +135,56 @@ def default_size(side: float) -> int:
 
 
 def _enlarged(panorama: NDArray[np.floating], factor: int) -> NDArray[np.floating]:
-    """Finer by a whole factor, bilinear, across the seam."""
+    """Finer by a whole factor: smooth, yet every texel keeps its light."""
     if factor == 1:
         return panorama
-    height, width = panorama.shape[:2]
-    padded = np.pad(np.pad(panorama, ((0, 0), (1, 1), (0, 0)), "wrap"), ((1, 1), (0, 0), (0, 0)), "edge")
-    for axis, count in ((0, height), (1, width)):
-        at = (np.arange(count * factor) + 0.5) / factor + 0.5
-        first = at.astype(np.intp)
-        weight = np.expand_dims((at - first).astype(np.float32), (1 - axis, 2))
-        before, after = (padded.take(first + step, axis) for step in (0, 1))
-        padded = before + (after - before) * weight
-    return padded
+    heights = -np.diff(_row_edges(len(panorama)))
+    finer = -np.diff(_row_edges(len(panorama) * factor)).reshape(-1, factor)
+    parts = np.cumsum(finer, axis=1) / heights[:, None]
+    padded = np.pad(panorama, ((1, 1), (0, 0), (0, 0)), "edge")
+    taller = _refined(padded, np.pad(heights, 1, "edge"), parts)
+    padded = np.pad(taller, ((0, 0), (1, 1), (0, 0)), "wrap").swapaxes(0, 1)
+    count = panorama.shape[1]
+    parts = np.broadcast_to(np.arange(1, factor + 1) / factor, (count, factor))
+    return _refined(padded, np.ones(count + 2), parts).swapaxes(0, 1)
+
+
+def _refined(light: NDArray[np.floating], widths: Light, parts: Light) -> Light:
+    """Means over parts of the cells along the first axis, whose first and last cell are only neighbours.
+
+    The sums up to each cell's end are interpolated by cubics that keep growing.
+
+    Parameters
+    ----------
+    light : ndarray, (K + 2, ...) float
+    widths : ndarray, (K + 2,) float64
+    parts : ndarray, (K, P) float64
+        Where the parts of a cell end, 1 at last.
+
+    References
+    ----------
+    Fritsch, Butland, "A Method for Constructing Local Monotone Piecewise Cubic Interpolants", 1984.
+    """
+    aside = (1,) * (light.ndim - 1)
+    first, second, wide = light[:-1].astype(np.float64), light[1:].astype(np.float64), widths.reshape(-1, *aside)
+    weight, other = 2 * wide[1:] + wide[:-1], wide[1:] + 2 * wide[:-1]
+    total = weight * second + other * first
+    edges = (weight + other) * first * second / np.where(total > 0, total, 1)  # a harmonic mean
+    at = parts.reshape(*parts.shape, *aside)
+    mean, start, end = light[1:-1, None], edges[:-1, None], edges[1:, None]
+    sums = mean * at**2 * (3 - 2 * at) + start * at * (1 - at) ** 2 - end * at**2 * (1 - at)
+    means = np.diff(sums, axis=1, prepend=0) / np.diff(at, axis=1, prepend=0)
+    return means.reshape(-1, *light.shape[1:])
+
+
+def _binned(light: NDArray[np.floating], size: int, axis: int) -> Light:
+    """Sums over `size` even parts of an axis; texels on their borders are shared out."""
+    light = np.moveaxis(light, axis, 0).astype(np.float64)
+    edges = np.arange(size + 1) * (len(light) / size)
+    texel = np.minimum(edges.astype(np.intp), len(light) - 1)
+    part = (edges - texel).reshape(-1, *[1] * (light.ndim - 1))
+    before = np.cumsum(light, axis=0) - light
+    return np.moveaxis(np.diff(before[texel] + part * light[texel], axis=0), 0, axis)
 
 
 def _quartered(panorama: NDArray[np.floating]) -> NDArray[np.floating]:

@@ -35,11 +35,11 @@ def prefiltered(faces: NDArray[np.float32]) -> tuple[NDArray[np.float32], ...]:
     alphas = [(level / last) ** 2 for level in range(1, last + 1)]
     sizes = [size >> level for level in range(1, last + 1)]
     # A lobe's harmonics fall by exp(-2 alpha degree), but that of roughness 1 has a kink at the horizon.
-    degrees = [max(int(10 / alpha), 128) for alpha in alphas]
+    degrees = [max(round(7 / alpha), 128) for alpha in alphas]
     return faces, *convolved(faces, [partial(ggx, alpha=alpha) for alpha in alphas], sizes, degrees)
 
 
-def ggx(angles: NDArray[np.float64], alpha: float) -> NDArray[np.float64]:
+def ggx(angles: NDArray[np.floating], alpha: float) -> NDArray[np.floating]:
     """How much light from some angles away a surface mirrors to a viewer straight above it; not normalised.
 
     References

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,16 +13,22 @@ from impostor.environment.cube import face_directions, sample, solid_angles
 from impostor.environment.environment import Environment
 from impostor.environment.harmonics import diffuse_harmonics, harmonic_diffuse
 from impostor.environment.panorama import panorama_directions, resized_faces
+from impostor.lighting import DirectionalLight
 from impostor.srgb import srgb_from_linear
 
-GREY, WHITE = 0.18, 16.0  # what the geometric mean is shown as, and what is shown as white
+GREY, WHITE = 0.3, 6.0  # what the geometric mean is shown as, and what is shown as white
 HEIGHT, BALL = 512, 320
 BACKGROUND = 0.06
 MARK, RADIUS = (1.0, 0.1, 0.05), 16
 MEASURED, SHOWN = 512, 256  # faces: larger ones would take many times as long to say and show the same
 
 
-def environment_summary(environment: Environment, lights: int) -> dict[str, Any]:
+def lights_of(environment: Environment, count: int) -> list[DirectionalLight]:
+    """Its `bright_lights`."""
+    return bright_lights(_at_most(environment, MEASURED), count)
+
+
+def environment_summary(environment: Environment, lights: Sequence[DirectionalLight]) -> dict[str, Any]:
     """A description of an environment and its brightest lights, ready for JSON; angles in degrees."""
     angles = solid_angles(environment.size)[..., None]
     mean = (environment.faces * angles).sum(axis=(0, 1, 2)) / (4 * np.pi)
@@ -48,13 +55,13 @@ def environment_summary(environment: Environment, lights: int) -> dict[str, Any]
                 # A light's colour is its irradiance / pi; that of all light together, from every side, is 4 x the mean.
                 "share_percent": round(100 * float(LUMINANCE @ light.color) / (4 * total), 1),
             }
-            for light in bright_lights(measured, lights)
+            for light in lights
         ],
     }
 
 
-def environment_sheet(environment: Environment, lights: int) -> NDArray[np.uint8]:
-    """The environment as a panorama with its brightest lights marked, over three balls in it.
+def environment_sheet(environment: Environment, lights: Sequence[DirectionalLight]) -> NDArray[np.uint8]:
+    """The environment as a panorama with lights marked, over three balls in it.
 
     The balls are matt white, a mirror, and a rough mirror (roughness 0.5), seen looking along -Z.
 
@@ -63,7 +70,6 @@ def environment_sheet(environment: Environment, lights: int) -> NDArray[np.uint8
     ndarray, (832, 1024, 3) uint8
         sRGB, exposed for the mean and toned.
     """
-    marks = [light.toward for light in bright_lights(environment, lights)]
     environment = _at_most(environment, SHOWN)
     panorama = environment.radiance(panorama_directions(HEIGHT))
     mean = float(np.exp(np.log(np.maximum(panorama @ LUMINANCE, 1e-9)).mean()))
@@ -78,8 +84,8 @@ def environment_sheet(environment: Environment, lights: int) -> NDArray[np.uint8
         row[:, start : start + BALL] = ball
     shown = _toned(row[..., :3], mean) * row[..., 3:] + BACKGROUND * (1 - row[..., 3:])
     picture = _toned(panorama, mean)
-    for toward in marks or [brightest_direction(environment)]:
-        _mark(picture, toward)
+    for light in lights:
+        _mark(picture, light.toward)
     return np.rint(255 * srgb_from_linear(np.concatenate([picture, shown]))).astype(np.uint8)
 
 

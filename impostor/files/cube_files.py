@@ -67,7 +67,7 @@ def find_faces(path: Path) -> list[Path]:
     pattern = None if path.is_dir() else path.name.lower()
     folder = path if pattern is None else path.parent
     if not folder.is_dir():
-        raise EnvironmentFileError(path, f"directory {str(folder)!r} does not exist")
+        raise EnvironmentFileError(path, f"directory {str(folder)!r} does not exist; expected one that does")
     found: dict[int, list[Path]] = {}
     family = NAMES[0]
     for file in sorted(folder.iterdir()):

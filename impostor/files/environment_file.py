@@ -87,9 +87,7 @@ def read_environment(
     return Environment(str(path), faces * np.float32(exposure))
 
 
-def write_environment(
-    path: FilePath, environment: Environment, *, force: bool = False, height: int | None = None
-) -> list[Path]:
+def write_environment(path: FilePath, environment: Environment, *, force: bool = False) -> list[Path]:
     """Write an environment, so that `read_environment` gives it again.
 
     Parameters
@@ -100,8 +98,6 @@ def write_environment(
     environment : Environment
     force : bool
         Replace existing files.
-    height : int, optional
-        Rows of the panorama, even; 2 N without it.
 
     Returns
     -------
@@ -120,16 +116,14 @@ def write_environment(
     files = output_files(path, force)
     made = None if files[0].parent.exists() else files[0].parent
     pictures = (
-        [panorama_from_faces(environment.faces, height)]
-        if len(files) == 1
-        else list(pictures_from_faces(environment.faces))
+        [panorama_from_faces(environment.faces)] if len(files) == 1 else list(pictures_from_faces(environment.faces))
     )
     if made:
         made.mkdir()
     try:
         with ExitStack() as outputs:
             for file, picture in zip(files, pictures, strict=True):
-                write_radiance(outputs.enter_context(atomic_output(file, force)), picture, file.suffix.lower())
+                write_radiance(outputs.enter_context(atomic_output(file, force)), picture)
     except BaseException:
         if made and not any(made.iterdir()):
             made.rmdir()

@@ -134,22 +134,35 @@ def write_lp(capture: CaptureSet, path: FilePath, force: bool = False) -> None:
     OutputError
         The file exists, or cannot be written.
     SettingsError
-        There are no photographs, or one cannot be named in the file.
+        There are no photographs, or one cannot be named in the file or is named twice: `read_lp` would not find them.
     """
     if not capture.photographs:
         raise SettingsError(path, "the capture set has no photographs; expected at least one")
     folder = Path(path).parent.resolve()
-    lines = [str(len(capture.photographs))]
+    lines, named = [str(len(capture.photographs))], set[str]()
     for photograph, direction in zip(capture.photographs, capture.directions.tolist(), strict=True):
         if not photograph.resolve().is_relative_to(folder):
             raise SettingsError(photograph, f"is not below {str(folder)!r}, the folder of the .lp file")
         name = photograph.resolve().relative_to(folder).as_posix()
-        if name != " ".join(name.split("\n")).strip() or len(name.splitlines()) != 1:
-            raise SettingsError(photograph, "name with a line end or with white space at an end; no .lp can hold it")
-        lines.append(f"{name} {' '.join(map(repr, direction))}")
+        line = f"{name} {' '.join(map(repr, direction))}"
+        if not _is_read_back(line, name):
+            raise SettingsError(photograph, f"name {name!r} cannot stand on a line of a .lp; expected a plain one")
+        if name in named:
+            raise SettingsError(photograph, "given twice; expected each photograph once")
+        named.add(name)
+        lines.append(line)
     text = "\n".join(lines) + "\n"
     with atomic_output(path, force) as temporary:
         temporary.write_bytes(text.encode("utf-8"))
+
+
+def _is_read_back(line: str, name: str) -> bool:
+    """Whether a line, written as UTF-8, gives this name again."""
+    try:
+        line.encode("utf-8")
+        return line.splitlines() == [line] and _light("", 0, line.strip())[0] == name
+    except (UnicodeEncodeError, LpFileError):
+        return False
 
 
 def _text(path: FilePath) -> str:

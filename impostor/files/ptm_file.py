@@ -121,8 +121,7 @@ def write_ptm(
         raise SettingsError(path, f"PTM is {ptm.size[0]} x {ptm.size[1]}; expected sides up to {LARGEST_SIDE}")
     if compression not in (None, "jpeg"):
         raise SettingsError("compression", f"{compression!r}; expected None or 'jpeg'")
-    if not 1 <= quality <= 100:
-        raise SettingsError("quality", f"{quality}; expected 1 to 100")
+    check_quality(quality)
     parts = _raw_parts(ptm) if compression is None else _jpeg_parts(ptm, quality, predict)
     checksum = 0
     for part in parts:
@@ -132,6 +131,17 @@ def write_ptm(
         with open(temporary, "wb") as file:
             file.writelines(parts)
         return temporary.stat().st_size
+
+
+def check_quality(quality: int, where: str = "quality") -> None:
+    """Refuse what is no quality of a JPEG.
+
+    Raises
+    ------
+    SettingsError
+    """
+    if not 1 <= quality <= 100:
+        raise SettingsError(where, f"{quality}; expected 1 to 100")
 
 
 def _file_bytes(path: FilePath) -> bytes:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio
@@ -14,7 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from impostor.environment.environment import MAX_FACE
-from impostor.errors import EnvironmentFileError, OutputError
+from impostor.errors import EnvironmentFileError
 from impostor.srgb import linear_from_srgb, srgb_from_linear
 
 FilePath = str | PathLike[str]
@@ -58,18 +60,19 @@ def read_radiance(path: FilePath) -> NDArray[np.float32]:
     """
     with _opened(path) as (source, spec, kind):
         texels = source.read_image(0, 0, 0, min(spec.nchannels, 3), "float")
-        problem = source.geterror()  # a truncated JPEG gives a picture all the same
+        problem = _problem(source)  # a truncated JPEG gives a picture all the same
     if texels is None or problem:
         raise EnvironmentFileError(path, _unreadable(kind, problem))
     texels = np.asarray(texels, np.float32).reshape(spec.height, spec.width, -1)
     texels = _upright(texels if texels.shape[2] == 3 else texels[..., :1].repeat(3, axis=2), spec)
     if str(spec.format) in ("uint8", "uint16"):
         return linear_from_srgb(texels)
-    # Radiance files say by how much their numbers were multiplied.
-    texels = texels / np.float32(spec.getattribute("hdr:exposure") or 1)
+    with np.errstate(all="ignore"):  # Radiance files say by how much their numbers were multiplied
+        texels = texels / np.float32(spec.getattribute("hdr:exposure") or 1)
+    _refuse(path, texels, ~np.isfinite(texels), "not finite")
     if str(spec.getattribute("compression") or "").startswith(LOSSY) and texels.min() >= -RINGING * texels.mean():
         texels = np.maximum(texels, 0)
-    _check_texels(path, texels)
+    _refuse(path, texels, texels < 0, "negative")
     return texels
 
 
@@ -86,33 +89,40 @@ def picture_size(path: FilePath) -> tuple[int, int]:
         return (spec.height, spec.width) if turned else (spec.width, spec.height)
 
 
-def write_radiance(path: Path, texels: NDArray[np.float32], suffix: str) -> None:
-    """Write (H, W, 3) linear light as a file of some suffix, over what there is; callers make it atomic.
+def write_radiance(path: Path, texels: NDArray[np.float32]) -> None:
+    """Write (H, W, 3) linear light, over what there is; callers make it atomic.
 
     ".png" keeps light from 0 to 1 in 8 bits on the sRGB curve, ".hdr" 8 bits of mantissa, ".exr" everything.
 
     Raises
     ------
-    OutputError
+    OSError
         The disk is full or the like.
     """
+    suffix = path.suffix.lower()
     if suffix == ".png":
         Image.fromarray(np.rint(srgb_from_linear(texels) * 255).astype(np.uint8)).save(path, format="PNG")
         return
     spec = oiio.ImageSpec(texels.shape[1], texels.shape[0], 3, "float")
     if suffix == ".hdr":
         # The mantissas are cut off, not rounded: half of their last digit keeps the mean where it is.
-        _, exponent = np.frexp(texels.max(axis=2, keepdims=True))
-        texels = texels + np.where(texels > 0, np.ldexp(np.float32(0.5), exponent - 8), 0)
+        largest = texels.max(axis=2, keepdims=True)
+        for _ in range(2):  # a number that is rounded up to a power of two has larger digits
+            half = np.ldexp(np.float32(0.5), np.frexp(largest)[1] - 8)
+            largest = largest + half
+        texels = np.where(texels > 0, texels + half, 0)
     else:
         spec.attribute("compression", "zip")
         spec.attribute("DateTime", "")  # the same light gives the same bytes
         spec.attribute("chromaticities", oiio.TypeDesc("float[8]"), PRIMARIES)
     output = oiio.ImageOutput.create(f"light{suffix}")
-    assert output is not None
-    if not (output.open(str(path), spec) and output.write_image(np.ascontiguousarray(texels, np.float32))):
-        raise OutputError(path, f"cannot be written: {output.geterror()}")
-    output.close()
+    if not (
+        output
+        and output.open(str(path), spec)
+        and output.write_image(np.ascontiguousarray(texels, np.float32))
+        and output.close()
+    ):
+        raise OSError(errno.EIO, _first_words(_problem(output)) if output else "no encoder")
 
 
 @contextmanager
@@ -123,7 +133,7 @@ def _opened(path: FilePath) -> Iterator[tuple[oiio.ImageInput, oiio.ImageSpec, s
     asked.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(str(path), asked)
     if source is None:
-        raise EnvironmentFileError(path, _unreadable(kind, oiio.geterror()))
+        raise EnvironmentFileError(path, _unreadable(kind, _problem(oiio)))
     try:
         spec = source.spec()
         _check_spec(path, spec)
@@ -158,9 +168,20 @@ def _kind(path: FilePath) -> str:
 
 
 def _unreadable(kind: str, problem: str) -> str:
-    """The decoder's first words, without the path that some put into them."""
-    first = (problem or "").strip().partition("\n")[0].split('"')[0].split(" (/")[0].strip(" (:")
-    return f"is truncated or damaged ({first or 'no texels'}); expected a whole {kind} file"
+    return f"is truncated or damaged ({_first_words(problem) or 'no texels'}); expected a whole {kind} file"
+
+
+def _problem(source: Any) -> str:
+    """What went wrong last; it may quote bytes of a damaged file that are no text."""
+    try:
+        return source.geterror()
+    except UnicodeDecodeError:
+        return "bytes that are no text"
+
+
+def _first_words(problem: str | None) -> str:
+    """What a library says, up to the path that some put into it."""
+    return (problem or "").strip().partition("\n")[0].split('"')[0].split(" (/")[0].strip(" (:")
 
 
 def _check_spec(path: FilePath, spec: oiio.ImageSpec) -> None:
@@ -194,11 +215,12 @@ def _upright(texels: NDArray[np.float32], spec: oiio.ImageSpec) -> NDArray[np.fl
     return texels
 
 
-def _check_texels(path: FilePath, texels: NDArray[np.float32]) -> None:
-    for name, wrong in (("not finite", ~np.isfinite(texels)), ("negative", texels < 0)):
-        if wrong.any():
-            texel = wrong.any(axis=2)
-            row, column = np.unravel_index(texel.argmax(), texel.shape)
-            value = texels[row, column][wrong[row, column]][0]
-            found = f"{np.count_nonzero(texel)} texels are {name}, the first in row {row}, column {column} ({value:g})"
-            raise EnvironmentFileError(path, f"{found}; expected radiance of at least 0")
+def _refuse(path: FilePath, texels: NDArray[np.float32], wrong: NDArray[np.bool_], name: str) -> None:
+    if not wrong.any():
+        return
+    texel = wrong.any(axis=2)
+    row, column = np.unravel_index(texel.argmax(), texel.shape)
+    value = texels[row, column][wrong[row, column]][0]
+    count = np.count_nonzero(texel)
+    found = f"{count} {'texel is' if count == 1 else 'texels are'} {name}, the first in row {row}, column {column}"
+    raise EnvironmentFileError(path, f"{found} ({value:g}); expected radiance of at least 0")

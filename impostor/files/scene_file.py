@@ -108,6 +108,7 @@ class _Reader:
             self.ground,
             rooms,
             values["shadow_lights"],
+            (1.0 if rooms else 0.0) if values["contact_shadow"] is None else values["contact_shadow"],
             tuple(_placement(key, parts) for key, parts in self.copies.items()),
             meshes,
             surfaces,

@@ -292,6 +292,7 @@ GROUND = {
     "ptm": Key(FileName((".ptm",))),
     "tile": Key(_LENGTH, 1.0, "m"),
     "reach": Key(_LENGTH, 100.0, "m"),
+    "visible": Key(Flag(), True),
 }
 ROOM = {
     "environment": Key(MapName(MAP_SUFFIXES)),
@@ -337,7 +338,8 @@ SCENE = {
     "sun": Key(Table(SUN)),
     "ground": Key(Table(GROUND)),
     "room": Key(Tables(ROOM, MOST_ROOMS), []),
-    "shadow_lights": Key(Whole(0, 8), 1),
+    "shadow_lights": Key(Whole(0, 8), 2),
+    "contact_shadow": Key(Number(0, 1)),
     "instance": Key(Tables(INSTANCE, 10_000), []),
     "scatter": Key(Tables(SCATTER, 256), []),
     "mesh": Key(Tables(MESH, 10_000), []),

@@ -110,11 +110,16 @@ def light_gram() -> NDArray[np.float64]:
         `difference @ light_gram() @ difference` is the mean squared difference of two texels' values; its last row
         gives a texel's mean value.
     """
-    # A product of two terms has degree four: two radii and eight angles integrate it over the disc without error.
-    angles = np.arange(8) * np.pi / 4
-    terms = [basis(r * np.cos(angles), r * np.sin(angles)) for r in np.sqrt((1 + np.array([-1, 1]) / 3**0.5) / 2)]
-    samples = np.concatenate(terms)
+    samples = basis(*disc_lights().T)
     return samples.T @ samples / len(samples)
+
+
+def disc_lights() -> NDArray[np.float64]:
+    """Light directions (16, 2) whose mean is that over the whole disc, of any polynomial of degree five or less."""
+    # A product of two terms of a PTM has degree four.
+    angles = np.arange(8) * np.pi / 4
+    radii = np.sqrt((1 + np.array([-1, 1]) / 3**0.5) / 2)
+    return np.concatenate([r * np.column_stack([np.cos(angles), np.sin(angles)]) for r in radii])
 
 
 def _halve_rows(texels: NDArray[np.float32]) -> NDArray[np.float32]:

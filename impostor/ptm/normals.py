@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from impostor.errors import SettingsError
-from impostor.ptm.polynomials import Polynomials, channels, picture, relight, unit_directions
+from impostor.ptm.polynomials import Polynomials, channels, light_direction, picture, relight, unit_directions
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec. 709
 ANGLES = 32  # Samples of the horizon, to start from.
@@ -66,9 +66,7 @@ def normals(polynomials: Polynomials) -> NDArray[np.float32]:
     ndarray of shape (H, W, 3), float32
         Of length 1: x right, y up, z >= 0 to the camera.
     """
-    light = brightest_light(polynomials)
-    height = np.sqrt(np.clip(1 - (light * light).sum(axis=-1), 0, 1))
-    return np.concatenate([light, height[..., None]], axis=-1).astype(np.float32)
+    return light_direction(*np.moveaxis(brightest_light(polynomials), -1, 0)).astype(np.float32)
 
 
 def albedo(polynomials: Polynomials) -> NDArray[np.float32]:

@@ -205,6 +205,22 @@ def evaluate(polynomials: Polynomials, lu: ArrayLike, lv: ArrayLike) -> NDArray[
     return np.clip(picture(polynomials, channels(polynomials, lu, lv)), 0, 1)
 
 
+def light_direction(lu: ArrayLike, lv: ArrayLike) -> NDArray[np.float64]:
+    """The direction in front of the surface whose projection on tangent and binormal is (lu, lv).
+
+    Parameters
+    ----------
+    lu, lv : array_like of shape (...)
+
+    Returns
+    -------
+    ndarray of shape (..., 3), float64
+        Of length 1: x right, y up, z out of the surface. Where lu² + lv² passes 1, z is 0 and the length more.
+    """
+    u, v = np.broadcast_arrays(np.asarray(lu, np.float64), np.asarray(lv, np.float64))
+    return np.stack([u, v, np.sqrt(np.clip(1 - u * u - v * v, 0, 1))], axis=-1)
+
+
 def drop_off(n_dot_l: ArrayLike) -> NDArray[np.float64]:
     """How much light is left when it comes from below the surface.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TypeVar, cast
 
@@ -19,10 +20,17 @@ AnyTexels = TypeVar("AnyTexels", NDArray[np.float32], NDArray[np.uint8])
 TOLERANCE = 0.1  # A patch is drawn from those whose overlap is at most so much worse than the best one's.
 OVERLAP = 4  # A patch overlaps the next one by a fourth.
 SMALLEST_PATCH = 8
+MOST_TEXELS = 4096 * 4096
 LOST_VARIANCE = 0.001
 
 
-def synthesise(ptm: AnyPtm, size: tuple[int, int], patch: int = 48, seed: int = 0) -> AnyPtm:
+def synthesise(
+    ptm: AnyPtm,
+    size: tuple[int, int],
+    patch: int = 48,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> AnyPtm:
     """Quilt a PTM of another size out of patches of one; the result repeats without a seam.
 
     Parameters
@@ -30,11 +38,13 @@ def synthesise(ptm: AnyPtm, size: tuple[int, int], patch: int = 48, seed: int = 
     ptm : Polynomials or Ptm
         Of a surface that is much alike everywhere.
     size : tuple of int
-        Width and height of the result in texels, at least `patch`.
+        Width and height of the result in texels: at least `patch`, at most `MOST_TEXELS` together.
     patch : int
         Side of a patch, about: larger than what the surface is made of, 8 or more.
     seed : int
         0 or more; the same seed gives the same texture.
+    progress : callable, optional
+        Called with patches laid and patches in all.
 
     Returns
     -------
@@ -58,7 +68,7 @@ def synthesise(ptm: AnyPtm, size: tuple[int, int], patch: int = 48, seed: int = 
     Perez, Gangnet, Blake 2003 (differences summed up, as a Poisson equation).
     """
     polynomials = ptm.polynomials() if isinstance(ptm, Ptm) else ptm
-    rows, columns = quilt(reflectance_features(polynomials), size, patch, seed)
+    rows, columns = quilt(reflectance_features(polynomials), size, patch, seed, progress)
     fields = ("coefficients", "color", "chroma")
     texels = {name: getattr(ptm, name) for name in fields if getattr(ptm, name) is not None}
     return replace(ptm, **{name: without_seams(array, rows, columns) for name, array in texels.items()})
@@ -78,6 +88,14 @@ def without_seams(texels: AnyTexels, rows: NDArray[np.intp], columns: NDArray[np
     ndarray of shape (height, width, ...), as `texels`
         Of the mean of what was taken; where there is no seam between two texels, their difference is nearly kept.
     """
+    made = np.empty((*rows.shape, *texels.shape[2:]), texels.dtype)
+    for plane in np.ndindex(texels.shape[2:]):  # one at a time: its transforms are many times as large as itself
+        summed = _plane_without_seams(texels[(..., *plane)], rows, columns)
+        made[(..., *plane)] = np.rint(np.clip(summed, 0, 255)) if texels.dtype == np.uint8 else summed
+    return cast(AnyTexels, made)
+
+
+def _plane_without_seams(texels: AnyTexels, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.float32]:
     taken = texels[rows, columns].astype(np.float32)
     divergence = np.zeros_like(taken)
     for axis, positions in ((0, rows), (1, columns)):
@@ -87,13 +105,10 @@ def without_seams(texels: AnyTexels, rows: NDArray[np.intp], columns: NDArray[np
     response = 2 * np.cos(2 * np.pi * np.fft.fftfreq(height))[:, None] + 2 * np.cos(2 * np.pi * np.fft.rfftfreq(width))
     response -= 4
     response[0, 0] = 1
-    spectrum = np.asarray(scipy.fft.rfft2(divergence, axes=(0, 1)))
-    spectrum /= response.astype(np.float32).reshape(*response.shape, *[1] * (taken.ndim - 2))
-    spectrum[0, 0] = taken.sum(axis=(0, 1))
-    summed = np.asarray(scipy.fft.irfft2(spectrum, (height, width), axes=(0, 1)))
-    if texels.dtype == np.uint8:
-        summed = np.rint(np.clip(summed, 0, 255))
-    return cast(AnyTexels, summed.astype(texels.dtype))
+    spectrum = np.asarray(scipy.fft.rfft2(divergence))
+    spectrum /= response.astype(np.float32)
+    spectrum[0, 0] = taken.sum()
+    return np.asarray(scipy.fft.irfft2(spectrum, (height, width)))
 
 
 def _differences(
@@ -138,7 +153,11 @@ def reflectance_features(polynomials: Polynomials) -> NDArray[np.float32]:
 
 
 def quilt(
-    features: NDArray[np.float32], size: tuple[int, int], patch: int, seed: int
+    features: NDArray[np.float32],
+    size: tuple[int, int],
+    patch: int,
+    seed: int,
+    progress: Callable[[int, int], None] | None = None,
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Where each texel of a quilted texture comes from.
 
@@ -146,7 +165,7 @@ def quilt(
     ----------
     features : ndarray of shape (H, W, D), float32
     size : tuple of int
-    patch, seed : int
+    patch, seed, progress
         As in `synthesise`.
 
     Returns
@@ -154,6 +173,12 @@ def quilt(
     rows, columns : ndarray of shape (height, width), intp
         Of `features`.
     """
+    if size[0] * size[1] > MOST_TEXELS:
+        raise SettingsError(
+            "size",
+            f"{size[0]}x{size[1]}; expected at most {MOST_TEXELS:,} texels: the result repeats without a seam, so "
+            "that a smaller one covers as large a wall",
+        )
     across = _places(size[0], patch, features.shape[1], "width")
     down = _places(size[1], patch, features.shape[0], "height")
     if seed < 0:
@@ -177,6 +202,8 @@ def quilt(
                 before, after = sides.overlaps(index)
                 keep |= _cut(error, before, axis) | _cut(error[::-1, ::-1], after, axis)[::-1, ::-1]
             source[rows, columns] = np.where(keep & filled, old, new)
+            if progress is not None:
+                progress(row_index * len(across.starts) + column_index + 1, len(down.starts) * len(across.starts))
     return np.divmod(source, features.shape[1])
 
 

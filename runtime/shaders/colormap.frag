@@ -10,10 +10,6 @@ uniform mat3 view_from_world;
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
     vec3 normal = normal_of(texel.x & 255);
-    if (normal == vec3(0.0)) {
-        entry = vec4(0.0);
-        return;
-    }
     Row row = row_at(texel.y);
     vec3 world = in_world(row, normal);
     if (show_normals) {

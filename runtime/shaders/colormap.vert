@@ -1,10 +1,9 @@
 #version 330
-// One instance fills a run of rows of the colormap texture.
-uniform int row_count, columns;
+// One instance fills a run of rows of the colormap texture, between two columns.
+uniform int row_count;
 in vec2 corner;
-in vec2 span;  // first row and the one after the last
+in vec4 span;  // first column and row, and those after the last
 
 void main() {
-    vec2 texel = vec2(corner.x * float(columns), mix(span.x, span.y, corner.y));
-    gl_Position = vec4(texel / vec2(512.0, row_count) * 2.0 - 1.0, 0.0, 1.0);
+    gl_Position = vec4(mix(span.xy, span.zw, corner) / vec2(512.0, row_count) * 2.0 - 1.0, 0.0, 1.0);
 }

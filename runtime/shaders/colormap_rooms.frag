@@ -4,23 +4,13 @@
 #include "lights.glsl"
 #include "environment.glsl"
 #include "rooms.glsl"
-#include "reflection.glsl"
 #include "colormap_row.glsl"
-#include "colormap_mirrored.glsl"
-uniform float metal;
+#include "colormap_place.glsl"
 
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
-    vec3 normal = normal_of(texel.x & 255);
-    if (normal == vec3(0.0)) {
-        entry = vec4(0.0);
-        return;
-    }
     Row row = row_at(texel.y);
-    vec3 world = in_world(row, normal), mirrored = vec3(0.0), diffuse, specular;
+    vec3 world = in_world(row, normal_of(texel.x & 255)), diffuse, specular;
     shade(world, row.back, row.gloss, diffuse, specular);
-    diffuse += diffuse_among(place_at(1, texel.y), world);
-    Room room = chosen_room(place_at(2, texel.y));
-    for (int i = 0; i < mirrors; ++i) mirrored = mirrored_by(room, row, texel.x & 255, normal, texel.y);
-    write_entry(texel.x, row.albedo, mix(diffuse, mirrored, metal), specular + (1.0 - metal) * mirrored);
+    write_entry(texel.x, row.albedo, diffuse + diffuse_among(place_at(1, texel.y), world), specular);
 }

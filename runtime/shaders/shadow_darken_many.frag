@@ -1,6 +1,7 @@
 #version 330
 // Takes from the ground the part of its light that the marked lights gave; any number of them.
 #include "shadow_marks.glsl"
+#include "shadow_fade.glsl"
 uniform int pictures;
 uniform float rows;      // of a picture
 uniform vec3 share[32];  // each light's part of the ground's linear light
@@ -13,5 +14,5 @@ void main() {
         for (int channel = 0; channel < 4; ++channel)
             light -= mark[channel] * share[4 * picture + channel];
     }
-    factor = factor_from(light);
+    factor = faded(factor_from(light));
 }

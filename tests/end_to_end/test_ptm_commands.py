@@ -39,13 +39,13 @@ def refused(capsys, *arguments):
     return code, err
 
 
-@pytest.mark.parametrize("format", ["lrgb", "rgb", "lum"])
+@pytest.mark.parametrize("format", ["lrgb", "RGB", "lum"])
 def test_fit_writes_a_file_that_shows_the_photographs(capsys, tmp_path, lp, pictures, format):
     said = ok(capsys, "ptm", "fit", lp, "-o", tmp_path / "a.ptm", "--format", format)
     assert f"32x24 {format.upper()}" in said and "30 photographs" in said and "condition number" in said
     ptm = read_ptm(tmp_path / "a.ptm")
     assert (ptm.format, ptm.size, ptm.curve, ptm.parameters) == (format.upper(), (32, 24), "srgb", "light")
-    if format == "rgb":
+    if format == "RGB":
         drawn = evaluate(ptm.polynomials(), *UV[3])
         assert np.abs(drawn - pictures[3] / 255).max() < 0.02
 
@@ -162,6 +162,7 @@ def test_lights_of_a_ball_become_a_capture_set(capsys, tmp_path):
     [
         (("--format", "hsh"), 2, "lrgb"),
         (("--space", "lab", "--format", "lum"), 2, "principal"),
+        (("--space", "principal"), 2, "expected --format lum"),
         (("--series", 3), 2, "1 or 2"),
         (("--series", 1, "--view"), 2, "--view"),
         (("--jpeg", 0), 2, "1 to 100"),
@@ -217,9 +218,49 @@ def test_compare_of_a_series_with_lights_is_refused(capsys, tmp_path, lp):
     assert "image series" in refused(capsys, "ptm", "compare", series, lp)[1]
 
 
-@pytest.mark.parametrize("light", ["1", "a,b", "0.1,0.2,0.3", "nan,0"])
+@pytest.mark.parametrize("light", ["1", "a,b", "0.1,0.2,0.3", "nan,0", "50,50"])
 def test_a_light_that_is_no_light_is_refused(capsys, tmp_path, lp, light):
     assert refused(capsys, "ptm", "direct", lp, "--light", light, "-o", tmp_path / "d.png")[0] == 2
+
+
+def test_lights_that_fit_would_refuse_are_not_written(capsys, tmp_path):
+    from tests.unit.test_chrome_ball import BALL, drawn_ball
+
+    lights = np.array([[0.5, 0, 0.866], [0.8, 0, -0.6]])
+    lights /= np.linalg.norm(lights, axis=1, keepdims=True)
+    balls = [np.rint(drawn_ball(light).clip(0, 1) * 255).astype(np.uint8) for light in lights]
+    front, behind = write_photographs(tmp_path, balls, name="ball")
+    circle, output = f"{BALL.x},{BALL.y},{BALL.radius}", tmp_path / "a.lp"
+    said = refused(capsys, "ptm", "lights", front, behind, "--circle", circle, "-o", output)[1]
+    assert "ball01.png" in said and "in front" in said
+    said = refused(capsys, "ptm", "lights", front, "--circle", circle, "-o", output, "--of", tmp_path / "none.png")[1]
+    assert "none.png: does not exist" in said
+    said = refused(capsys, "ptm", "lights", front, front, "--circle", circle, "-o", output)[1]
+    assert "ball00.png: given twice" in said
+    assert not output.exists()
+
+
+@pytest.mark.parametrize(
+    ("subject", "flags", "message"),
+    [
+        ("heights", ("--size", 64), "--size: given with"),
+        ("heights", ("--from", "top"), "--from: given with"),
+        ("heights", ("--up", "z"), "--up: given with"),
+        ("knot", ("--depth", 8), "--depth: given with"),
+        ("knot", ("--albedo", "a.png"), "--albedo: given with"),
+        ("knot", ("--size", 0), "--size: 0 texels; expected 16 to"),
+        ("heights", ("--dome", "rings:95x3"), "--dome: 'rings:95x3': elevation 95 degrees; expected 0 to 90"),
+        ("heights", ("--dome", "fibonacci:9:95"), "--dome: 'fibonacci:9:95': elevation 95"),
+        ("heights", ("--dome", "fibonacci:0"), "--dome: 'fibonacci:0': 0 lights"),
+        ("heights", ("--dome", "rings:0x8"), "--dome: lowest z is 0; expected above 0"),
+        ("heights", ("--jpeg", 101), "--jpeg: 101; expected 1 to 100"),
+    ],
+)
+def test_flags_that_capture_has_no_use_for_are_refused(capsys, tmp_path, subject, flags, message):
+    (heights,) = write_photographs(tmp_path, [np.zeros((16, 16), np.uint8)])
+    given = heights if subject == "heights" else SAMPLES / "knot.stl"
+    assert message in refused(capsys, "ptm", "capture", given, "-o", tmp_path / "a.lp", *flags)[1]
+    assert not (tmp_path / "a.lp").exists()
 
 
 def test_fit_without_a_terminal_prints_no_bar(tmp_path):

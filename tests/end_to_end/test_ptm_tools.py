@@ -99,7 +99,7 @@ def test_a_copy_over_its_source_says_both_sizes(capsys, bumps, tmp_path):
 def test_a_viewers_direction_is_a_unit_vector_too(capsys, tmp_path):
     write_ptm(quantise(replace(matt_bumps()[1], parameters="view")), tmp_path / "view.ptm")
     code, error = failed(capsys, "ptm", "render", tmp_path / "view.ptm", "-o", tmp_path / "a.png", "--light=3,3")
-    assert code == 2 and "u² + v² at most 1" in error
+    assert code == 2 and "lu² + lv² at most 1" in error
 
 
 def test_a_video_shows_the_light_going_round(capsys, bumps, tmp_path):
@@ -130,11 +130,13 @@ def test_a_synthesised_ptm_has_the_size_asked_for(capsys, bumps, tmp_path):
     ("arguments", "message"),
     [
         (["render", "{ptm}", "-o", "a.png", "--light", "1"], "--light"),
-        (["render", "{ptm}", "-o", "a.png", "--light=0.9,0.9"], "u² + v² at most 1"),
+        (["render", "{ptm}", "-o", "a.png", "--light=0.9,0.9"], "lu² + lv² at most 1"),
         (["render", "{ptm}", "-o", "a.png", "--light", "nan,0"], "--light"),
         (["render", "{ptm}", "-o", "a.jpg"], "expected a name that ends in '.png'"),
         (["render", "{ptm}", "-o", "a.png", "--output", "depth"], "lit, normal, albedo"),
         (["render", "{ptm}", "-o", "a.png", "--specular", "-1,3"], "--specular"),
+        (["render", "{ptm}", "-o", "a.png", "--gain", "nan"], "--gain: nan; expected a finite number"),
+        (["relight-video", "{ptm}", "-o", "a.mp4", "--gain", "inf"], "--gain: inf"),
         (["convert", "{ptm}", "b.ptm", "--format", "hsh"], "rgb, lrgb or lum"),
         (["convert", "{ptm}", "b.ptm", "--jpeg", "0"], "1 to 100"),
         (["convert", "{ptm}", "b.ptm", "--format", "lum", "--jpeg", "90"], "LRGB or RGB"),
@@ -146,6 +148,10 @@ def test_a_synthesised_ptm_has_the_size_asked_for(capsys, bumps, tmp_path):
         (["synthesise", "{ptm}", "-o", "b.ptm", "--patch", "1"], "--patch"),
         (["synthesise", "{ptm}", "-o", "b.ptm", "--seed", "-1", "--size", "64x64", "--patch", "24"], "--seed"),
         (["synthesise", "{ptm}", "-o", "b.ptm", "--size", "65536x64"], "65535"),
+        (
+            ["synthesise", "{ptm}", "-o", "b.ptm", "--size", "8192x4096"],
+            "--size: 8192x4096; expected at most 16,777,216",
+        ),
     ],
 )
 def test_what_cannot_be_done_is_one_line_and_writes_nothing(capsys, bumps, tmp_path, monkeypatch, arguments, message):
@@ -153,6 +159,32 @@ def test_what_cannot_be_done_is_one_line_and_writes_nothing(capsys, bumps, tmp_p
     code, error = failed(capsys, "ptm", *[part.format(ptm=bumps) for part in arguments])
     assert code in (1, 2) and message in error
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bumps.ptm"]
+
+
+@pytest.mark.parametrize("parameters", ["series", "view"])
+def test_what_needs_light_directions_refuses_a_ptm_without(capsys, tmp_path, parameters):
+    ptm = tmp_path / "other.ptm"
+    write_ptm(random_ptm(parameters=parameters), ptm)
+    for flags in (("--output", "normal"), ("--output", "albedo"), ("--specular", "0.5,30"), ("--gain", "2")):
+        code, error = failed(capsys, "ptm", "render", ptm, "-o", tmp_path / "a.png", *flags)
+        assert code == 2 and "other.ptm" in error and "expected light directions" in error and flags[0] in error
+    code, error = failed(capsys, "ptm", "relight-video", ptm, "-o", tmp_path / "a.mp4")
+    assert code == 2 and "expected light directions" in error
+    assert list(tmp_path.iterdir()) == [ptm]
+    ok(capsys, "ptm", "render", ptm, "-o", tmp_path / "a.png", "--light=0.3,0.3")
+
+
+def test_a_series_takes_parameters_that_are_no_light(capsys, tmp_path):
+    write_ptm(random_ptm(parameters="series"), tmp_path / "a.ptm")
+    ok(capsys, "ptm", "render", tmp_path / "a.ptm", "-o", tmp_path / "a.png", "--light=1,1")
+
+
+def test_info_says_what_other_codings_lose(capsys, bumps):
+    found = json_of(capsys, "ptm", "info", bumps, "--json", "--coding")
+    assert 30 < found["shift_scheme_db"] < 60 and 25 < found["codebook_db"] < 60
+    assert found["codebook_bytes_per_texel"] < found["bytes_per_texel"]
+    assert "shift scheme db" in ok(capsys, "ptm", "info", bumps, "--coding")
+    assert "shift_scheme_db" not in json_of(capsys, "ptm", "info", bumps, "--json")
 
 
 def test_an_output_that_exists_stays(capsys, bumps, tmp_path):

@@ -3,13 +3,18 @@
 import numpy as np
 import pytest
 
+from impostor.environment import Environment, Reflection, Room
+from impostor.environment.blending import diffuse_weights, mirrored_room
+from impostor.environment.colormap import environment_colormap, surface_points
 from impostor.lighting import DirectionalLight, Gloss, colormap
 from impostor.srgb import srgb_from_linear
 from impostor.views import basis_facing, direction, rotation_about_y
 from runtime.cameras import Camera
+from runtime.environments import RoomTable
+from runtime.fan_textures import FanTextures
 from runtime.gl_state import preserved_state
 from runtime.lights import LightTable
-from runtime.relight import ROW_DTYPE, ColormapPass
+from runtime.relight import PLACE_DTYPE, ROW_DTYPE, ColormapPass, Surroundings
 from tests.solids import BLUE, RED, Box, Sphere, solid_fan
 
 BASES = np.concatenate(
@@ -101,6 +106,66 @@ def camera(azimuth):
     return made.clip_from_view, made.view_from_world
 
 
+NOISE = [Environment(f"noise {size}", 4 * RANDOM.random((6, size, size, 3)) ** 4) for size in (8, 32)]
+HALL, ROTUNDA = Room.box(NOISE[0], (10, 4, 8), yaw=0.4), Room.sphere(NOISE[1], 3, (2, 0, 1), exposure=0.5)
+SKY, STARS = Room.far(NOISE[1], yaw=1.0), Room.far(NOISE[0])
+HALF_FLOAT = 2e-3  # what 16 bits, and a filter of 8, leave of the brightest texel
+
+
+class TestSurroundings:
+    @pytest.fixture
+    def textures(self, ctx):
+        made = FanTextures(ctx, PAINTED)
+        yield made
+        made.release()
+
+    @pytest.fixture
+    def rooms(self, ctx):
+        made = RoomTable(ctx)
+        yield made
+        made.release()
+
+    def surroundings(self, rooms, textures, among, reflection):
+        """Of copies at random places, and their views, places and scales."""
+        rooms.update(among)
+        count = 40
+        views = RANDOM.integers(0, len(PAINTED.views), count)
+        centers, scales = RANDOM.uniform((-3, -1.8, -2), (3, 1.8, 2), (count, 3)), RANDOM.uniform(0.2, 1, count)
+        places = np.zeros(count, PLACE_DTYPE)
+        places["center"], places["scale"], places["view"] = centers, scales, views
+        places["weights"][:, : len(among)] = diffuse_weights(among, centers)
+        places["mirrored"][np.arange(count), mirrored_room(among, centers)] = 1
+        return Surroundings(rooms, places, reflection, textures.points), views, centers, scales
+
+    @pytest.mark.parametrize(
+        "among",
+        [[SKY], [HALL], [ROTUNDA, SKY], [ROTUNDA, HALL, SKY, STARS]],
+        ids=["far", "box", "two", "four"],
+    )
+    @pytest.mark.parametrize(
+        "reflection",
+        [None, Reflection(), Reflection(0.9, 0.7, 4, 0.5, 1), Reflection(0.6, 0.1, 3, 0.25, 0.4)],
+        ids=["matt", "lacquer", "metal", "half metal"],
+    )
+    @pytest.mark.parametrize("folded", [0, 1])
+    def test_the_gpu_equals_numpy(self, ctx, colormaps, table, textures, rooms, among, reflection, folded):
+        lit_by, gloss, albedo = lights(2), Gloss(0.3, 10.0), (0.5, 0.25, 1.0, folded)
+        table.update(lit_by, AMBIENT)
+        around, views, centers, scales = self.surroundings(rooms, textures, among, reflection)
+        bases = PAINTED.views.basis[views]
+        found = written(ctx, colormaps, table, rows_for(bases, gloss, albedo), surroundings=around)
+        points = surface_points(PAINTED)[views] * scales[:, None, None]
+        lit = colormap(bases, lit_by, AMBIENT, gloss)
+        expected = environment_colormap(bases, centers, among, reflection, points, lit)
+        bound = HALF_FLOAT * 4
+        if folded:
+            colors = srgb_from_linear(expected.diffuse * albedo[:3] + expected.specular)
+            assert np.abs(found[:, :256, :3] - colors).max() < 12.92 * bound
+            return
+        assert np.abs(found[:, :256, :3] - expected.diffuse).max() < bound
+        assert np.abs(found[:, 256:, :3] - expected.specular).max() < bound
+
+
 class TestRelitOnlyWhenNeeded:
     """`statistics["relit"]` counts the tiles that the last draw sent through a new colormap."""
 
@@ -152,6 +217,51 @@ class TestRelitOnlyWhenNeeded:
         drawn()
         renderer.lights, renderer.ambient = (DirectionalLight((0, 0, 2)),), (0.1, 0.2, 0.3)
         assert drawn()[0] == 0
+
+    def test_every_change_of_the_surroundings_is_seen(self, renderer, drawn):
+        renderer.lights, renderer.ambient = [], 0
+        renderer.add(PAINTED, reflection=Reflection())
+        dark = drawn()[1]
+        for rooms in ([SKY], [Room.far(NOISE[1], yaw=2.0)], [HALL], [ROTUNDA, HALL], []):
+            renderer.rooms = rooms
+            relit, picture = drawn()
+            assert relit == 1
+            assert (np.abs(picture.astype(int) - dark).max() > 20) == bool(rooms)
+            assert drawn()[0] == 0
+
+    def test_equal_rooms_made_anew_are_no_change(self, renderer, drawn):
+        renderer.add(FAN)
+        renderer.rooms = [Room.far(NOISE[1], yaw=1.0)]
+        drawn()
+        renderer.rooms = (Room.far(NOISE[1], yaw=1.0),)
+        assert drawn()[0] == 0
+
+    def test_copies_share_a_tile_where_the_light_is_the_same(self, renderer, drawn):
+        renderer.add(FAN, [(-2, 0, 0), (2, 0, 0), (2.001, 0, 0)], reflection=Reflection())
+        for rooms, tiles in (([], 1), ([SKY], 1), ([HALL], 2), ([SKY, STARS], 1), ([ROTUNDA, SKY], 2)):
+            renderer.rooms = rooms
+            assert drawn()[0] == tiles
+
+    def test_a_copy_that_moves_in_a_room_is_lit_anew(self, renderer, drawn):
+        copies = renderer.add(FAN, reflection=Reflection())
+        renderer.rooms = [HALL]
+        drawn()
+        copies.positions[:, 0] = 1
+        assert drawn()[0] == 1
+
+    def test_a_copy_with_another_reflection_has_a_tile_of_its_own(self, renderer, drawn):
+        renderer.rooms = [SKY]
+        renderer.add(FAN, (-2, 0, 0))
+        renderer.add(FAN, (2, 0, 0), reflection=Reflection())
+        renderer.add(FAN, (0, 2, 0), reflection=Reflection())
+        assert drawn()[0] == 2
+
+    def test_albedo_and_normals_have_no_surroundings(self, renderer, drawn):
+        renderer.add(PAINTED, reflection=Reflection())
+        plain = [drawn(output=output)[1] for output in ("albedo", "normal")]
+        renderer.rooms = [HALL]
+        for output, expected in zip(("albedo", "normal"), plain, strict=True):
+            np.testing.assert_array_equal(drawn(output=output)[1], expected)
 
     def test_a_turn_and_another_view_are_seen(self, renderer, drawn):
         copies = renderer.add(FAN, [(-2, 0, 0), (2, 0, 0)])

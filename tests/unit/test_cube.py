@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from impostor.environment import cube
+from runtime.gl_state import preserved_state
 from tests.gl import SWITCHES, gl
 
 CORNERS = np.array(list(itertools.product((-1, 1), repeat=3)), float)
@@ -84,6 +85,7 @@ def test_a_linear_field_is_read_as_such():
     assert np.abs(cube.sample(faces, directions)[:, 0] - expected).max() < 5e-3
 
 
+@pytest.mark.usefixtures("screen")
 def test_opengl_reads_the_same_from_a_real_cube_map(ctx, noise):
     """All over the sphere, at edges and at corners."""
     directions = np.concatenate([around(EDGES, 0.1), around(CORNERS, 0.1), around(np.zeros((1, 3)), 1, 3000)])
@@ -106,21 +108,21 @@ def read_by_opengl(ctx, faces, directions):
         void main() { color = textureLod(faces, texelFetch(directions, ivec2(gl_FragCoord.xy), 0).xyz, 0.0); }
         """,
     )
-    program["directions"] = 1
     cube_map = ctx.texture_cube((8, 8), 4, faces.tobytes(), dtype="f4")
     cube_map.filter = moderngl.LINEAR, moderngl.LINEAR
     asked = ctx.texture((64, height), 3, directions.tobytes(), dtype="f4")
     asked.filter = moderngl.NEAREST, moderngl.NEAREST
     target = ctx.texture((64, height), 4, dtype="f4")
     framebuffer, array = ctx.framebuffer(target), ctx.vertex_array(program, [])
-    framebuffer.use()
-    cube_map.use(0)
-    asked.use(1)
-    gl("glEnable", SWITCHES["TEXTURE_CUBE_MAP_SEAMLESS"])
-    array.render(moderngl.TRIANGLES, vertices=3)
-    gl("glDisable", SWITCHES["TEXTURE_CUBE_MAP_SEAMLESS"])
+    with preserved_state(ctx):
+        program["directions"] = 1
+        framebuffer.use()
+        cube_map.use(0)
+        asked.use(1)
+        gl("glEnable", SWITCHES["TEXTURE_CUBE_MAP_SEAMLESS"])
+        array.render(moderngl.TRIANGLES, vertices=3)
+        gl("glDisable", SWITCHES["TEXTURE_CUBE_MAP_SEAMLESS"])
     read = np.frombuffer(target.read(), np.float32).reshape(-1, 4)
-    gl("glUseProgram", 0)
     for part in (array, framebuffer, target, asked, cube_map, program):
         part.release()
     return read

@@ -59,6 +59,6 @@ def test_nothing_names_an_address_or_a_machine():
 
 def test_the_numbers_of_the_readme_are_the_benchmarks():
     results = json.loads(readme_table.RESULTS.read_text())
-    for page, make in ((readme_table.README, readme_table.table), (readme_table.PTM_PAGE, readme_table.ptm_table)):
+    for page, make in readme_table.PAGES:
         text = page.read_text()
         assert readme_table.with_table(text, make(results)) == text

@@ -180,6 +180,25 @@ def test_rooms_share_a_point_as_in_numpy(run, name):
     assert len(np.unique(chosen.argmax(axis=1))) >= min(len(rooms), 3) - 1
 
 
+@pytest.mark.parametrize("name", SEVERAL)
+def test_what_a_room_has_alone_no_other_lights(ctx, name):
+    """Nowhere in the sphere, its surface included."""
+    rooms, table = SEVERAL[name], RoomTable(ctx)
+    table.update(rooms)
+    centers, radii = RANDOM.uniform(-4, 4, (3000, 3)), RANDOM.uniform(0.01, 0.6, 3000)
+    alone = table.alone_around(centers, radii)
+    table.release()
+    offsets = RANDOM.normal(size=(20, 3000, 3))
+    points = centers + offsets * (radii[:, None] / np.linalg.norm(offsets, axis=-1, keepdims=True))
+    claimed = alone >= 0
+    assert 0.02 < claimed.mean() < 0.95
+    number = alone[claimed]
+    for place in points[:, claimed]:
+        weights = diffuse_weights(rooms, place)
+        np.testing.assert_allclose(np.take_along_axis(weights, number[:, None], -1), 1, atol=1e-9)
+        np.testing.assert_array_equal(mirrored_room(rooms, place), number)
+
+
 def test_every_room_shows_its_own_environment(run):
     """Of several sizes in one texture, nothing of one is found in another."""
     rooms = [

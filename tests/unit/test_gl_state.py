@@ -5,10 +5,12 @@ import gc
 import numpy as np
 import pytest
 
+from impostor.environment import Environment, Reflection, Room
 from impostor.errors import SettingsError
 from impostor.lighting import DirectionalLight, Gloss, LocalLight
 from impostor.shadow_projection import Ground
 from runtime import ImpostorRenderer
+from runtime.bump import Bump
 from runtime.cameras import Camera
 from runtime.gpu import make_context
 from runtime.grounds import GroundSurface
@@ -28,27 +30,36 @@ LIGHTS = [DirectionalLight.from_angles(30, 50, (0.6, 0.5, 0.4)), DirectionalLigh
 CAMERA = Camera.perspective((0, 5, 9), (0, 0.7, 0), 45, 1, 1, 40)
 MATRICES = (CAMERA.clip_from_view, CAMERA.view_from_world)
 PTM = random_ptm(size=(16, 16))
+LIGHT = np.random.default_rng(0).uniform(0, 1, (6, 8, 8, 3))
+ROOMS = [Room.box(Environment("box", LIGHT), (7, 6, 9), (0, 2, 0)), Room.far(Environment("sky", LIGHT[::-1]))]
+MIRROR, BUMP = Reflection(least=0.3, roughness=0.2), Bump(np.full((2, 2, 3), (90, 150, 255), np.uint8))
+CARD = rectangle(1, 1)
 SURFACE = GroundSurface(texture=np.full((3, 5, 4), 200, np.uint8))
 CALLS = {
     "ground": lambda renderer: renderer.draw_ground(*MATRICES, LEVEL, SURFACE),
     "shadows": lambda renderer: renderer.draw_shadows(*MATRICES, LEVEL),
     "meshes": lambda renderer: renderer.draw_meshes(*MATRICES),
     "surfaces": lambda renderer: renderer.draw_surfaces(*MATRICES),
+    "rooms": lambda renderer: renderer.draw_rooms(*MATRICES),
+    "a room on something": lambda renderer: renderer.draw_room_on(*MATRICES, ROOMS[0], "cylinder"),
     "fans": lambda renderer: renderer.draw(*MATRICES),
     "albedo": lambda renderer: renderer.draw(*MATRICES, output="albedo"),
     "normals": lambda renderer: renderer.draw(*MATRICES, output="normal"),
     "add": lambda renderer: renderer.add(FAN, (0, 0, 3), gloss=Gloss(0.2)),
     "add a mesh": lambda renderer: renderer.add_mesh(MODEL),
+    "add bumps": lambda renderer: renderer.add_mesh(CARD, bump=BUMP),
     "add a surface": lambda renderer: renderer.add_surface(PTM, rectangle(1, 1)),
 }
-PICTURE = ("ground", "surfaces", "shadows", "meshes", "fans")
+PICTURE = ("ground", "surfaces", "shadows", "meshes", "fans", "rooms")
 
 
 def scene(renderer):
     renderer.lights = LIGHTS
     renderer.add(FAN, [(-2, 0, 0), (2, 0, -1)], 0.3)
     renderer.add(PAINTED, (0, 0, -2), gloss=Gloss(0.5))
+    renderer.rooms = ROOMS
     renderer.add_mesh(MODEL)
+    renderer.add_mesh(CARD, matrix_at(2, 1, 2), reflection=MIRROR, bump=BUMP)
     renderer.add_surface(PTM, rectangle(2, 2), world_from_model=matrix_at(0, 1, -3))
     renderer.local_lights = [LocalLight((0, 1, -2))]
 
@@ -260,11 +271,14 @@ def test_what_is_taken_away_is_freed(ctx, renderer, screen):
 
     def visit():
         placed = [renderer.add(FAN), renderer.add(PAINTED, [(1, 0, 1)] * 3), renderer.add(FAN, (3, 0, 0))]
-        meshes = [renderer.add_mesh(MODEL), renderer.add_mesh(MODEL, matrix_at(2, 0, 0))]
-        for call in ("ground", "shadows", "meshes", "fans", "normals"):
+        meshes = [renderer.add_mesh(MODEL), renderer.add_mesh(CARD, matrix_at(2, 0, 0), reflection=MIRROR, bump=BUMP)]
+        renderer.rooms = ROOMS
+        for call in ("ground", "shadows", "meshes", "rooms", "fans", "normals"):
             CALLS[call](renderer)
         for each in placed + meshes:
             renderer.remove(each)
+        renderer.rooms = ()
+        renderer.draw_rooms(*MATRICES)
 
     visit()
     after_one = live_objects()

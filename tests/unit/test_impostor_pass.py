@@ -10,6 +10,7 @@ from scipy.ndimage import binary_erosion
 from impostor.lighting import DirectionalLight, Gloss
 from impostor.views import direction
 from runtime import ImpostorRenderer, LevelOfDetail
+from runtime.impostors import _ascending
 from runtime.offscreen import Offscreen
 from tests.pictures import apart, bluish, cropped, filling, iou, looking, placed
 from tests.solids import BLUE, GREEN, RED, WHITE, Box, Sphere, card_fan, corner_card, solid_fan, solid_model
@@ -269,6 +270,17 @@ class TestManyCopies:
         renderer.add(PAINTED, positions[shuffled], yaws[shuffled])
         # Tiles lie elsewhere in the cache now, which may round a colour the other way.
         assert apart(draw(matrices, "lit"), expected).max() <= 2
+
+    @pytest.mark.parametrize("digits", [0, 6])
+    def test_copies_are_sorted_as_numpy_sorts_them(self, digits):
+        values = (np.random.default_rng(0).normal(0, 30, 5000).round(digits) + 0.0).astype(np.float32)
+        np.testing.assert_array_equal(_ascending(values), np.argsort(values, kind="stable"))
+
+    def test_copies_that_were_added_apart_share_tiles(self, renderer, draw):
+        for x in (-2.0, 0.0, 2.0):
+            renderer.add(FAN, (x, 0, 0))
+        assert draw(filling(4.0), "lit").any()
+        assert renderer.statistics["relit"] == 1
 
     def test_a_near_copy_blends_over_a_far_one(self, renderer, draw):
         """Its edge shows the far one through it, and not the background."""

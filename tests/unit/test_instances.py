@@ -193,6 +193,19 @@ def test_some_quads_by_mask_are_those_by_index():
         np.testing.assert_array_equal(some.center, quads.center[mask])
 
 
+@pytest.mark.parametrize("name", ["positions", "yaws", "scales"])
+def test_what_is_written_into_an_array_shows_at_once_and_only_that_places_copies_anew(name):
+    copies, eye = Instances(FAN, np.arange(12.0).reshape(4, 3)), np.array([0, 0, 1.0, 0])
+    before, placement = quads_toward(copies, eye), copies.placement
+    copies.visible[0], copies.shares[1] = False, 0.5
+    assert copies.placement is placement
+    getattr(copies, name)[2] += 1.5
+    after = quads_toward(copies, eye)
+    assert copies.placement is not placement
+    apart = np.abs(np.stack([after.center, after.right]) - np.stack([before.center, before.right])[:, 1:])
+    assert (apart.max(axis=(0, 2)) > 0.1).tolist() == [False, True, False]
+
+
 def test_invisible_copies_show_nothing():
     copies = Instances(FAN, np.zeros((4, 3)))
     copies.visible[[0, 2]] = False

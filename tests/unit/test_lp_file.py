@@ -157,9 +157,12 @@ def test_what_is_written_is_read_back(folder):
 
 def test_what_no_lp_can_say_is_not_written(folder):
     up = np.array([[0.0, 0.0, 1.0]])
-    for photographs in ((folder.parent / "outside.jpg",), (folder / "two\nlines.jpg",), (folder / "blank.jpg ",), ()):
+    names = ("two\nlines.jpg", "blank.jpg ", '"quoted.jpg"', "comma,", "not UTF-8 \udcff.jpg")
+    for photographs in ((folder.parent / "outside.jpg",), (), *((folder / name,) for name in names)):
         with pytest.raises(SettingsError):
             write_lp(CaptureSet(photographs, up), folder / "out.lp")
+    with pytest.raises(SettingsError, match="twice"):
+        write_lp(CaptureSet((folder / "a.jpg", folder / "a.jpg"), np.repeat(up, 2, axis=0)), folder / "out.lp")
     assert not (folder / "out.lp").exists()
     with pytest.raises(SettingsError, match="2 photographs, 1 directions"):
         CaptureSet((folder / "a.jpg", folder / "b.jpg"), up)

@@ -1,12 +1,15 @@
 """Fits recover known polynomials, whatever the photographs are stored as, and refuse lights that cannot tell."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from PIL import Image
 
+from bake import one_pass
 from bake.design import ONE_PARAMETER, make_design
 from bake.dome import ring_dome
-from bake.photographs import PhotographError, open_photographs
+from bake.photographs import PhotographError, decoded, open_photographs
 from bake.ptm import fit_ptm, light_parameters
 from impostor.errors import SettingsError
 from impostor.files.lp_file import CaptureSet
@@ -33,9 +36,33 @@ def test_more_photographs_than_a_batch_equal_plain_least_squares(tmp_path):
     pictures = rng.integers(0, 256, (30, 9, 8, 3)).astype(np.uint8)
     design = make_design(UV)
     expected = np.linalg.lstsq(design.matrix, pictures.reshape(30, -1) / 255, rcond=None)[0].reshape(6, 9, 8, 3)
-    for workers in (1, 3):
-        found = fit(tmp_path, pictures, format="rgb", workers=workers)
-        np.testing.assert_allclose(np.moveaxis(found.coefficients, -1, 0), expected, atol=2e-5)
+    found = fit(tmp_path, pictures, format="rgb")
+    np.testing.assert_allclose(np.moveaxis(found.coefficients, -1, 0), expected, atol=2e-5)
+
+
+@pytest.mark.parametrize("format", ["rgb", "lrgb", "lum"])
+def test_any_number_of_threads_gives_the_same_bits(tmp_path, monkeypatch, format):
+    monkeypatch.setattr(one_pass, "BLOCK", 32)
+    photographs = open_photographs(
+        write_photographs(tmp_path, np.random.default_rng(1).integers(0, 256, (30, 20, 17, 3)).astype(np.uint8))
+    )
+    one, *others = (fit_ptm(photographs, UV, format=format, workers=workers) for workers in (1, 2, 3, 7))
+    for other in others:
+        for name in ("coefficients", "color", "chroma"):
+            np.testing.assert_array_equal(getattr(other, name), getattr(one, name))
+
+
+@pytest.mark.parametrize("batch", [1, 4, 7, 30])
+def test_photographs_decoded_ahead_come_each_once_and_whole(tmp_path, batch):
+    pictures = np.random.default_rng(0).integers(0, 256, (30, 3, 4, 3)).astype(np.uint8)
+    photographs = open_photographs(write_photographs(tmp_path, pictures))
+    seen = []
+    with ThreadPoolExecutor(3) as pool:
+        for indices, pixels in decoded(photographs, pool, batch):
+            assert len(indices) <= batch
+            np.testing.assert_array_equal(pixels, pictures[indices])
+            seen.extend(indices.tolist())
+    assert seen == list(range(30))
 
 
 def test_lrgb_of_one_colour_times_light_is_exact(tmp_path):

@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 
+from impostor.environment import Environment, Reflection, Room
+from impostor.environment.colormap import environment_colormap
+from impostor.environment.cube import face_directions
 from impostor.lighting import DirectionalLight, colormap
 from impostor.views import basis_facing, direction
 from runtime.lights import REMEMBERED, LightTable
@@ -45,6 +48,37 @@ class TestChange:
             table.update([sun(turn / 10)], 0.2)
         assert np.isinf(table.change_since(np.array([3]))).all()
         assert table.change_since(np.array([table.version])) == 0
+
+
+class TestRoomChange:
+    """Of surroundings that are bright on one side."""
+
+    environment = Environment("side", np.repeat(np.exp(2 * face_directions(16)[..., :1]) / 8, 3, axis=-1))
+    reflections = (None, Reflection(0.9, 0.9, roughness=0.5, metal=1), Reflection(roughness=0.3))
+
+    @pytest.mark.parametrize("reflection", reflections, ids=["matt", "metal", "lacquer"])
+    @pytest.mark.parametrize(("turn_deg", "exposure"), [(0.1, 1), (1, 1), (20, 1), (0, 1.02)])
+    def test_it_is_about_what_a_normal_sees(self, table, reflection, turn_deg, exposure):
+        before = [Room.far(self.environment, 0.3)]
+        after = [Room.far(self.environment, 0.3 + np.radians(turn_deg), exposure)]
+        table.update([], 0, before)
+        table.update([], 0, after)
+        (found,) = table.change_since(np.array([1]), reflection)
+        bases = basis_facing(direction(np.arange(6), 0.2))
+        first, last = (environment_colormap(bases, np.zeros(3), rooms, reflection) for rooms in (before, after))
+        seen = np.abs(last.diffuse + last.specular - first.diffuse - first.specular)[:, :225]
+        assert 0.9 * np.sqrt(np.mean(seen**2)) <= found <= 2 * seen.max() + 1e-6
+        if reflection is None:
+            assert seen.max() <= 1.02 * found
+
+    def test_a_room_that_moves_or_comes_is_wholly_another(self, table):
+        box = Room.box(self.environment, (4, 4, 4))
+        for rooms in ([], [box], [Room.box(self.environment, (4, 4, 4), (0, 0.1, 0))], [box, box]):
+            table.update([], 0, rooms)
+            assert np.isinf(table.change_since(np.array([table.version - 1]))).all()
+        brighter = Room.box(self.environment, (4, 4, 4), exposure=1.01)
+        table.update([], 0, [box, brighter])
+        assert 0 < table.change_since(np.array([table.version - 1])) < 0.1
 
 
 class TestSharedColormaps:
@@ -100,6 +134,20 @@ class TestManyTiles:
         assert renderer.statistics["relit"] == renderer.statistics["tiles"]
         renderer._impostors.forget()
         np.testing.assert_array_equal(turned, self.drawn(renderer, screen, sun(40)))
+
+    def test_surroundings_that_turn_slowly_are_spread_over_frames_and_then_exact(self, renderer, screen, few_texels):
+        random = np.random.default_rng(3)
+        renderer.add(FAN, random.uniform(-5, 5, (60, 3)), random.uniform(0, 6, 60))
+        relit = []
+        for yaw in (0.0, 0.004, *[0.008] * 20):
+            renderer.rooms = [Room.far(TestRoomChange.environment, yaw)]
+            last = self.drawn(renderer, screen)
+            relit.append(renderer.statistics["relit"])
+        assert relit[0] == renderer.statistics["tiles"]
+        assert 0 < relit[1] < relit[0] / 2
+        assert relit[-1] == 0
+        renderer._impostors.forget()
+        np.testing.assert_array_equal(last, self.drawn(renderer, screen))
 
     def test_a_sun_that_never_rests_leaves_no_tile_behind(self, renderer, screen, few_texels):
         random = np.random.default_rng(3)

@@ -271,7 +271,7 @@ def test_rooms_stand_on_the_ground_and_turn_with_time(folder):
 
 def test_a_room_is_the_light_where_nothing_else_is_said(folder):
     scene = load(folder, f'{CAMERA}\n[[room]]\nenvironment = "a.hdr"')
-    assert scene.lights == () and scene.ambient == (0, 0, 0) and scene.shadow_lights == 1
+    assert scene.lights == () and scene.ambient == (0, 0, 0) and scene.contact_shadow == 1
     assert scene.files[folder / "a.hdr"] == {"rooms"}
 
 
@@ -320,4 +320,4 @@ def test_the_shipped_scenes_load(path, tmp_path):
 
 
 def test_scenes_are_shipped():
-    assert {path.stem for path in SCENES} == {"forest", "square", "close"}
+    assert {path.stem for path in SCENES} == {"forest", "square", "close", "study", "meadow"}

@@ -557,6 +557,11 @@ class TestCaller:
         with pytest.raises(SettingsError, match=words):
             Surface(**{"ptm": make_ptm(size=4), "model": rectangle(1, 1), **change})
 
+    @pytest.mark.parametrize("sides", [(-1, 1), (1, 0), (float("nan"), 1), (1, float("inf"))])
+    def test_a_rectangle_without_area_is_refused(self, sides):
+        with pytest.raises(SettingsError, match="rectangle"):
+            rectangle(*sides)
+
     def test_refusals_that_need_the_mesh_and_the_ptm(self, draw):
         ptm = make_ptm(size=4)
         bare = Model.from_arrays([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])

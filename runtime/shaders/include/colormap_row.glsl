@@ -22,7 +22,6 @@ vec3 in_world(Row row, vec3 v) {
     return row.right * v.x + row.up * v.y + row.back * v.z;
 }
 
-// Zero where the code has none.
 vec3 normal_of(int code) {
     return texelFetch(byte_to_normal, ivec2(code, 0), 0).xyz;
 }

@@ -52,9 +52,8 @@ vec3 light_around(vec4 environment, vec3 toward, float roughness, float footprin
     float wide = sharp ? 0.0 : 1.0;
     vec3 finer = level_texel(environment, below, wide, place), coarser = level_texel(environment, min(below + 1.0, last), wide, place);
     vec3 light = mix(finer, coarser, level - below);
-    // A loop that a mirror never enters: a software rasteriser also runs what an `if` leaves out.
-    int dull = sharp && roughness > 0.0 && last > 0.0 ? 1 : 0;
-    for (int i = 0; i < dull; ++i) light = mix(light, level_texel(environment, 1.0, 1.0, place), roughness * last);
+    if (sharp && roughness > 0.0 && last > 0.0)
+        light = mix(light, level_texel(environment, 1.0, 1.0, place), roughness * last);
     return light;
 }
 

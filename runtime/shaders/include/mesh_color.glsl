@@ -25,10 +25,9 @@ vec3 seen_normal(vec3 normal, vec3 toward_eye) {
 // `around` is diffuse light beside that of the lights; `mirrored` what the surface reflects, which a metal colours.
 vec4 mesh_color(vec3 normal, vec3 toward_eye, vec3 around, vec3 mirrored, float metal) {
     vec3 albedo = surface_albedo(v_uv, v_tint.rgb);
-    if (output_kind == 1) return vec4(srgb_from_linear(albedo), 1.0);
-    if (output_kind == 2) return vec4(view_from_world * normal * 0.5 + 0.5, 1.0);
     vec3 diffuse, specular;
     shade(normal, toward_eye, gloss, diffuse, specular);
     vec3 colored = (1.0 - metal) * (diffuse + around) + metal * mirrored;
-    return vec4(srgb_from_linear(albedo * colored + (1.0 - metal) * mirrored + specular), 1.0);
+    vec3 light = output_kind == 1 ? albedo : albedo * colored + (1.0 - metal) * mirrored + specular;
+    return vec4(output_kind == 2 ? view_from_world * normal * 0.5 + 0.5 : srgb_from_linear(light), 1.0);
 }

@@ -122,10 +122,7 @@ Room chosen_room(vec4 chosen) {
 }
 
 vec3 diffuse_among(vec4 weights, vec3 normal) {
-    vec3 light = weights.x * diffuse_in(room_at(0), normal) + weights.y * diffuse_in(room_at(1), normal);
-    // A loop that two rooms never enter: a software rasteriser also runs what an `if` leaves out.
-    int more = rooms[2 * ROWS + 3].w > 2.5 ? 0 : 1;
-    for (int i = 0; i < more; ++i)
-        light += weights.z * diffuse_in(room_at(2), normal) + weights.w * diffuse_in(room_at(3), normal);
+    vec3 light = vec3(0.0);
+    for (int i = 0; i < MAX_ROOMS; ++i) light += weights[i] * diffuse_in(room_at(i), normal);
     return light;
 }
