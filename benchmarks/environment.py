@@ -152,7 +152,7 @@ def run_quality(bench: Workbench) -> Table:
         pictures.release()
     table.notes.append(
         f"Means over {CAMERAS} orthographic cameras at the fan's elevation, at the tiles' own size, over the pixels "
-        f"that mesh or impostor touch, in {panorama_name()}: far, or as a box eight radii wide and five high. No lights."
+        f"that mesh or impostor touch, in {panorama_name()}: far, or as a box eight radii wide, five high. No lights."
     )
     return table
 

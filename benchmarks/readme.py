@@ -8,7 +8,9 @@ from typing import Any
 
 RESULTS = Path(__file__).with_name("results") / "results.json"
 ROOT = Path(__file__).resolve().parents[1]
-README, PTM_PAGE, WALK_PAGE = ROOT / "README.md", ROOT / "docs" / "ptm.md", ROOT / "docs" / "walk.md"
+README, PTM_PAGE, WALK_PAGE, ROOMS_PAGE = (
+    ROOT / page for page in ("README.md", "docs/ptm.md", "docs/walk.md", "docs/rooms.md")
+)
 START, END = "<!-- table from benchmarks/results -->\n", "<!-- end of table -->\n"
 MACHINE = "software-gl"
 
@@ -99,6 +101,19 @@ def walk_table(results: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def rooms_table(results: dict[str, Any]) -> str:
+    """The lines of the table of fans against meshes in the same surroundings, as Markdown."""
+    rows = results[MACHINE]["tables"]["environment_quality"]["rows"]
+    lines = ["| PSNR, dB, at the fan's views | in a far room | in a box |", "|---|---:|---:|"]
+    for key, row in rows.items():
+        name, place, surface = key.split("/")
+        if place == "far":
+            far, box = (rows[f"{name}/{each}/{surface}"]["values"]["at_views_db"] for each in ("far", "box"))
+            label = row["label"].replace(", far", "")
+            lines.append(f"| {label} | {far:.1f} | {box:.1f} |")
+    return "\n".join(lines) + "\n"
+
+
 def _share(values: dict[str, float], scene: str) -> str:
     milliseconds, share = values[f"{scene}_ms"], values[f"{scene}_%"]
     return f"{milliseconds:,.0f}" if share is None else f"{milliseconds:,.1f} ms, {share:.0f} %"
@@ -110,7 +125,7 @@ def with_table(page: str, made: str) -> str:
     return before + START + made + END + rest.split(END)[1]
 
 
-PAGES = ((README, table), (PTM_PAGE, ptm_table), (WALK_PAGE, walk_table))
+PAGES = ((README, table), (PTM_PAGE, ptm_table), (WALK_PAGE, walk_table), (ROOMS_PAGE, rooms_table))
 
 
 def main() -> None:

@@ -1,7 +1,8 @@
 """Renders the documentation's figures: `python -m docs.figures [NAME ...] [--out FOLDER]`.
 
 Figures 3, 5a, 5b, 6b, 9 and 10 are counterparts of those in Dinh, Metoyer, Turk, "Real-Time Lighting Changes for
-Image-Based Rendering"; those named `ptm_...` of figures in HPL-98-131 and HPL-2004-225; `hero` and `compare` are the
+Image-Based Rendering"; those named `ptm_...` of figures in HPL-98-131 and HPL-2004-225, those
+named `room_...` of GPU Gems, chapter 19; `hero` and `compare` are the
 README's. All are made from sample_models by the project itself.
 """
 
@@ -18,6 +19,7 @@ from PIL import Image
 
 from docs.figure_layers import figure_3, figure_5a, figure_5b, figure_6b
 from docs.figure_ptm import ptm_direct, ptm_dome, ptm_lights, ptm_normals, ptm_quilt
+from docs.figure_rooms import room_day, room_localised, room_materials, room_shapes
 from docs.figure_scenes import compare, figure_9, figure_10, hero
 from docs.studio import Studio
 from impostor.files.output import atomic_output
@@ -26,6 +28,7 @@ FIGURES: dict[str, Callable[[Studio], Image.Image]] = {
     figure.__name__: figure
     for figure in (figure_3, figure_5a, figure_5b, figure_6b, figure_9, figure_10, hero, compare)
     + (ptm_dome, ptm_direct, ptm_lights, ptm_normals, ptm_quilt)
+    + (room_localised, room_materials, room_shapes, room_day)
 }
 FOLDER = Path(__file__).with_name("figures")
 LARGEST = 700_000  # bytes

@@ -16,7 +16,20 @@ from impostor.shadow_projection import Ground
 from impostor.views import rotation_about_y
 
 Vector = tuple[float, float, float]
-PARTS = ("camera", "lights", "sun", "ambient", "background", "ground", "rooms", "shadow_lights", "contact_shadow", "instances", "meshes", "surfaces")
+PARTS = (
+    "camera",
+    "lights",
+    "sun",
+    "ambient",
+    "background",
+    "ground",
+    "rooms",
+    "shadow_lights",
+    "contact_shadow",
+    "instances",
+    "meshes",
+    "surfaces",
+)
 """The fields of a scene that can change one without the other."""
 
 

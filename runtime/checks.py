@@ -41,6 +41,19 @@ def numbers(where: str, name: str, values: ArrayLike, *shapes: tuple[int, ...]) 
     return array
 
 
+def invertible(where: str, name: str, matrix: ArrayLike | None) -> NDArray[np.float64]:
+    """A (4, 4) float64 matrix that has an inverse, the identity for None.
+
+    Raises
+    ------
+    SettingsError
+    """
+    given = numbers(where, name, np.eye(4) if matrix is None else matrix, (4, 4))
+    if not abs(np.linalg.det(given)) > 0:
+        raise SettingsError(where, f"{name} has no inverse; expected a matrix that has one")
+    return given
+
+
 def check_type(where: str, value: object, kind: type, origin: str = "") -> None:
     """Refuse what is not of a type; `origin` says where such a thing comes from.
 

@@ -8,7 +8,9 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from impostor.errors import SettingsError
 from impostor.shadow_projection import Ground
+from runtime.checks import check_type
 from runtime.environments import RoomTable
 from runtime.gl_state import CallerState, set_state
 from runtime.gpu import SRGB8_ALPHA8, check_texture_size, load_program, set_uniforms
@@ -48,6 +50,22 @@ class GroundSurface:
     def fade(self) -> tuple[float, float]:
         """Metres from the middle where it starts to fade and where nothing is left."""
         return self.reach / 2, self.reach
+
+
+def check_surface(surface: GroundSurface) -> None:
+    """Refuse what is no surface, or one with an impossible texture.
+
+    Raises
+    ------
+    SettingsError
+    """
+    check_type("surface", surface, GroundSurface)
+    texture = surface.texture
+    if texture is None:
+        return
+    check_type("ground texture", texture, np.ndarray)
+    if texture.dtype != np.uint8 or texture.ndim != 3 or texture.shape[2] != 4 or not texture.size:
+        raise SettingsError("ground texture", f"{texture.shape} {texture.dtype}; expected (H, W, 4) uint8")
 
 
 class GroundPass:

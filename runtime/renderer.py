@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import moderngl
@@ -18,11 +18,11 @@ from impostor.model import Model
 from impostor.ptm.quantise import Ptm
 from impostor.shadow_projection import Ground
 from runtime.bump import Bump
-from runtime.checks import check_type, numbers
+from runtime.checks import check_type, invertible
 from runtime.environments import RoomTable, check_rooms
 from runtime.fan_textures import FanTextures
 from runtime.gl_state import CallerState, preserved_state
-from runtime.grounds import GroundPass, GroundSurface
+from runtime.grounds import GroundPass, GroundSurface, check_surface
 from runtime.impostors import Batch, ImpostorPass
 from runtime.instances import Instances, Viewer
 from runtime.light_settings import LightSettings
@@ -54,7 +54,6 @@ class ImpostorRenderer(LightSettings):
         May be replaced or changed in place at any time; the next draw shows it.
     ambient : ndarray, (3,) float64
         Linear light that reaches every normal; set as one number or three. Read-only: replace it.
-
     local_lights : sequence of LocalLight
         Lamps in the scene; only surfaces with PTMs show their light.
     rooms : sequence of Room
@@ -169,10 +168,7 @@ class ImpostorRenderer(LightSettings):
         """
         self._check_in_use()
         check_type("model", model, Model, ", as impostor.load_model gives")
-        given = np.eye(4) if world_from_model is None else world_from_model
-        matrix = np.array(numbers(model.name, "world_from_model", given, (4, 4)))
-        if not abs(np.linalg.det(matrix)) > 0:
-            raise SettingsError(model.name, "world_from_model has no inverse; expected a matrix that has one")
+        matrix = np.array(invertible(model.name, "world_from_model", world_from_model))
         if reflection is not None:
             check_type("reflection", reflection, Reflection)
         if bump is not None:
@@ -342,7 +338,7 @@ class ImpostorRenderer(LightSettings):
     ) -> None:
         """Draw a plane, lit by lights and rooms, for callers who have no ground of their own."""
         check_type("ground", ground, Ground)
-        _check_surface(surface)
+        check_surface(surface)
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
             self._update_lights("lit")
             self._ground_pass.draw(state, viewer, self._table, self._room_table, ground, surface)
@@ -441,13 +437,3 @@ class ImpostorRenderer(LightSettings):
         passes = self._impostors, self._mesh_pass, self._ground_pass, self._shadows, self._surface_pass
         for part in (*passes, self._room_pass, self._table, self._room_table):
             part.release()
-
-
-def _check_surface(surface: GroundSurface) -> None:
-    check_type("surface", surface, GroundSurface)
-    texture = surface.texture
-    if texture is None:
-        return
-    check_type("ground texture", texture, np.ndarray)
-    if texture.dtype != np.uint8 or texture.ndim != 3 or texture.shape[2] != 4 or not texture.size:
-        raise SettingsError("ground texture", f"{texture.shape} {texture.dtype}; expected (H, W, 4) uint8")

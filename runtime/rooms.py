@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from impostor.environment.room import Room
 from impostor.errors import SettingsError
-from runtime.checks import numbers
+from runtime.checks import invertible
 from runtime.environments import RoomTable
 from runtime.gl_state import CallerState, set_state
 from runtime.gpu import load_program, set_uniforms
@@ -37,6 +37,7 @@ class RoomPass:
     def __init__(self, ctx: moderngl.Context):
         corners = {"cube": _cube(), "plane": PLANE, "picture": PICTURE}
         self._buffers = {name: ctx.buffer(np.ascontiguousarray(each, np.float32)) for name, each in corners.items()}
+        self._programs: list[moderngl.Program] = []
         self._far = self._array(ctx, "picture", "room_far.vert", "room_far.frag")
         flat = "room.vert", "room_flat.frag"
         round_ = self._array(ctx, "cube", "room.vert", "room_round.frag")
@@ -48,7 +49,8 @@ class RoomPass:
         }
 
     def _array(self, ctx: moderngl.Context, buffer: str, *shaders: str) -> moderngl.VertexArray:
-        return ctx.vertex_array(load_program(ctx, *shaders), [(self._buffers[buffer], "3f", "corner")])
+        self._programs.append(load_program(ctx, *shaders))
+        return ctx.vertex_array(self._programs[-1], [(self._buffers[buffer], "3f", "corner")])
 
     def draw(self, state: CallerState, rooms: Mapping[int, Room], table: RoomTable, viewer: Viewer) -> None:
         """Draw rooms by their numbers in a table: the first far one behind everything, others as what they are."""
@@ -95,13 +97,9 @@ class RoomPass:
 
     def release(self) -> None:
         """Free everything this pass made."""
-        arrays = {id(array): array for array in (*self._arrays.values(), self._far)}
-        for array in arrays.values():
-            program = array.program
-            array.release()
-            program.release()
-        for buffer in self._buffers.values():
-            buffer.release()
+        arrays = {array.glo: array for array in (*self._arrays.values(), self._far)}.values()
+        for resource in (*arrays, *self._programs, *self._buffers.values()):
+            resource.release()
 
 
 def number_of(rooms: Sequence[Room], room: Room) -> int:
@@ -132,10 +130,7 @@ def to_show(
     if shape not in SHOWN_ON:
         raise SettingsError("room", f"shown on {shape!r}; expected one of {', '.join(SHOWN_ON)}")
     given = room.world_from_room if world_from_shape is None else world_from_shape
-    matrix = numbers("room", "world_from_shape", np.eye(4) if given is None else given, (4, 4))
-    if not abs(np.linalg.det(matrix)) > 0:
-        raise SettingsError("room", "world_from_shape has no inverse; expected a matrix that has one")
-    return number, matrix
+    return number, invertible("room", "world_from_shape", given)
 
 
 def _cube() -> NDArray[np.float32]:

@@ -106,6 +106,8 @@ class ShadowPass:
         if ground.plane @ viewer.eye <= 0 or not (len(fans) or len(meshes)):
             return
         marks = self._marks_of(settings, viewer, ground)
+        if not marks:
+            return
         # Marks of four lights stand in each picture, pictures on top of each other in one texture.
         pictures = self._ctx.info["GL_MAX_TEXTURE_SIZE"] // (_size(viewer)[1] + 1)
         at_once = min(MOST_LIGHTS, CHANNELS * max(pictures, 1))

@@ -106,7 +106,7 @@ def camera(azimuth):
     return made.clip_from_view, made.view_from_world
 
 
-NOISE = [Environment(f"noise {size}", 4 * RANDOM.random((6, size, size, 3)) ** 4) for size in (8, 32)]
+NOISE = [Environment(f"noise {size}", 4 * RANDOM.random((6, size, size, 3), np.float32) ** 4) for size in (8, 32)]
 HALL, ROTUNDA = Room.box(NOISE[0], (10, 4, 8), yaw=0.4), Room.sphere(NOISE[1], 3, (2, 0, 1), exposure=0.5)
 SKY, STARS = Room.far(NOISE[1], yaw=1.0), Room.far(NOISE[0])
 HALF_FLOAT = 2e-3  # what 16 bits, and a filter of 8, leave of the brightest texel

@@ -95,8 +95,9 @@ class TestDarkness:
         for lift in range(LIFTS):
             pictures = [looked_up(each, x, z, lift) for each in (found, expected)]
             outside = (np.abs(x) > 0.27) | (np.abs(z) > 0.27)
-            assert np.abs(pictures[0] - pictures[1])[outside].mean() < 0.03
-            assert np.corrcoef(*(picture[outside] for picture in pictures))[0, 1] > 0.95
+            assert np.abs(pictures[0] - pictures[1])[outside].mean() < 0.02
+            # Of the last there is little left.
+            assert lift == LIFTS - 1 or np.corrcoef(*(picture[outside] for picture in pictures))[0, 1] > 0.97
 
     def test_strength_scales_it_and_off_is_nothing(self, renderer, hidden):
         renderer.add_mesh(solid_model(CUBE))

@@ -13,8 +13,8 @@ from tests.solids import Sphere, solid_fan
 
 NORMALS = BYTE_TO_NORMAL[:225].astype(float)
 MIDDLE = 112
-EVEN = Environment("even", np.full((6, 8, 8, 3), (0.2, 0.4, 0.8)))
-DIRECTIONS = Environment("directions", 1 + face_directions(16))
+EVEN = Environment("even", np.full((6, 8, 8, 3), (0.2, 0.4, 0.8), np.float32))
+DIRECTIONS = Environment("directions", (1 + face_directions(16)).astype(np.float32))
 BASES = basis_facing(direction([0.0, 1.3, -2.4], 0.26))
 MIRROR = Reflection(strength=1, least=1, roughness=SHARPEST)
 

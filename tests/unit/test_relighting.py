@@ -53,7 +53,7 @@ class TestChange:
 class TestRoomChange:
     """Of surroundings that are bright on one side."""
 
-    environment = Environment("side", np.repeat(np.exp(2 * face_directions(16)[..., :1]) / 8, 3, axis=-1))
+    environment = Environment("side", (np.exp(2 * face_directions(16)[..., [0, 0, 0]]) / 8).astype(np.float32))
     reflections = (None, Reflection(0.9, 0.9, roughness=0.5, metal=1), Reflection(roughness=0.3))
 
     @pytest.mark.parametrize("reflection", reflections, ids=["matt", "metal", "lacquer"])

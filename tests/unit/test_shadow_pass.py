@@ -11,6 +11,7 @@ from impostor.srgb import srgb_from_linear
 from impostor.strips import silhouette_strips
 from impostor.views import direction
 from runtime import Instances
+from runtime.draw_calls import counted_draw_calls
 from runtime.grounds import GroundSurface
 from runtime.instances import Viewer, nearest_views, quads_toward
 from runtime.offscreen import Offscreen
@@ -189,6 +190,16 @@ class TestShape:
         renderer.add(FAN, (1000, 0, -1000))
         ground(filling(2.4, 0.3, 0.5, (1000.8, 0.5, -1000.6)), [light])
         assert iou(marked(renderer), expected) > 0.97
+
+    def test_copies_of_a_mesh_are_one_draw_call(self, renderer, ground):
+        """As many shadows as copies, each where its copy stands."""
+        model, matrices = solid_model(Box((-0.1, 0, -0.1), (0.1, 0.4, 0.1))), filling(2.0, 0.0, np.pi / 2)
+        for x in (-1.5, -0.5, 0.5, 1.5):
+            renderer.add_mesh(model, placed((x, 0, 0.3 * x), x))
+        with counted_draw_calls() as calls:
+            found = shadowed(ground(matrices, [light_at(0, 45)]))
+        assert label(binary_erosion(found))[1] == 4
+        assert calls.count == 3  # the ground, the marks, the darkening
 
     @pytest.mark.parametrize("view", [0, 0.5])
     def test_a_solid_has_a_shadow_without_cracks(self, renderer, ground, view):
@@ -391,6 +402,61 @@ class TestInTheScene:
             alone |= shadowed(ground(matrices, [light]))
             renderer.remove(tree)
         assert iou(together, alone) > 0.95
+
+
+class TestOnAGroundThatFades:
+    """Shadows go with the ground: they darken no sky."""
+
+    SURFACE = GroundSurface(albedo=(1, 1, 1), reach=8.0, background=(0.5, 0.6, 0.9, 1.0))
+    MATRICES = looking((0, 6, 10), (0, 0, 0), 90)
+
+    @pytest.fixture
+    def faded(self, renderer, screen):
+        """Pictures with shadows that fade, with shadows that do not, and without."""
+
+        def drawn(lights, ambient=0.1, matrices=self.MATRICES, plane=LEVEL, surface=self.SURFACE):
+            renderer.lights, renderer.ambient = lights, ambient
+            pictures = []
+            for draw in (
+                lambda: renderer.draw_shadows(*matrices, plane, surface),
+                lambda: renderer.draw_shadows(*matrices, plane),
+                lambda: None,
+            ):
+                screen.clear((0.5, 0.6, 0.9, 1))
+                renderer.draw_ground(*matrices, plane, surface)
+                draw()
+                pictures.append(screen.color()[..., :3].astype(int))
+            return pictures
+
+        return drawn
+
+    @pytest.mark.parametrize("count", [1, 6])
+    def test_where_the_ground_is_gone_so_is_its_shadow(self, renderer, faded, count):
+        """A roof over everything."""
+        renderer.add_mesh(solid_model(Box((-40, 20, -40), (40, 20.1, 40))))
+        fading, whole, bare = faded([light_at(60 * index, 75, (0.8 / count,) * 3) for index in range(count)])
+        far = 40, 2
+        np.testing.assert_array_equal(fading[far], bare[far])
+        assert apart(whole, bare)[far] > 40
+        # Below the middle of the picture the ground is whole.
+        middle = SIZE // 2, SIZE // 2
+        np.testing.assert_array_equal(fading[middle], whole[middle])
+        assert apart(fading, bare)[middle] > 60
+
+    def test_between_they_fade_evenly(self, renderer, faded):
+        renderer.add_mesh(solid_model(Box((-40, 20, -40), (40, 20.1, 40))))
+        fading, _, bare = faded([light_at(0, 80, (0.8, 0.8, 0.8))])
+        row = apart(fading, bare)[SIZE // 2, SIZE // 2 :]
+        assert (np.diff(row) <= 1).all()
+        assert len(np.unique(row)) > 10
+
+    def test_around_another_middle_on_a_slope(self, renderer, faded):
+        renderer.add_mesh(solid_model(Box((-40, 20, -40), (40, 20.1, 40))))
+        surface = GroundSurface(albedo=(1, 1, 1), reach=4.0, middle=(2, 0, 1), background=(0.5, 0.6, 0.9, 1.0))
+        fading, _, bare = faded([light_at(0, 80)], plane=SLOPE, surface=surface)
+        shade, ground = apart(fading, bare) > 30, apart(bare, bare[0, 0]) > 5
+        assert shade.sum() > 100
+        assert not (shade & ~ground).any()
 
 
 class TestFrameByFrame:
