@@ -63,7 +63,7 @@ def run_frames(bench: Workbench) -> Table:
         for renderer in (field.renderer, mesh._renderer):
             renderer.lights, renderer.ambient = (lights(1), AMBIENT) if name == "light" else ((), 0)
             renderer.rooms = () if name == "light" else [Room.far(panorama())]
-        field.renderer._batches[0].instances.reflection = reflection
+        field.renderer._placed.batches[0].instances.reflection = reflection
         for each in mesh._placed:
             each.reflection = reflection
     of_fans = alternate(*(field.impostors for field in fields), ctx=bench.ctx)

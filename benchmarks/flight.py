@@ -100,7 +100,7 @@ class Flight:
 
     @property
     def _levels(self) -> list[Levels]:
-        return [batch.levels for batch in self.renderer._batches if batch.levels is not None]
+        return [batch.levels for batch in self.renderer._placed.batches if batch.levels is not None]
 
     def picture(self) -> Picture:
         """Draw a frame from scratch, although nothing may have moved."""
@@ -149,7 +149,7 @@ class Flight:
         """How many copies have switched, and where (N, 4) those stand whose views did: left, top, right, bottom."""
         found: dict[str, int] = dict.fromkeys(KINDS, 0)
         rectangles = []
-        for batch in self.renderer._batches:
+        for batch in self.renderer._placed.batches:
             instances = batch.instances
             now = batch.seen_by(seen.viewer)
             then = _with_view(instances, now, before.viewer.eye)

@@ -181,11 +181,11 @@ class MeshField:
 
     def meshes(self, count: int) -> None:
         """A frame of the first `count` meshes without shadows."""
-        self._renderer._meshes = self._placed[:count]
+        self._renderer._placed.meshes = self._placed[:count]
         self._field.target.clear(BACKGROUND)
         self._renderer.draw_meshes(*self._field.matrices)
 
     def release(self) -> None:
         """Free everything on the GPU."""
-        self._renderer._meshes = self._placed
+        self._renderer._placed.meshes = self._placed
         self._renderer.release()

@@ -7,6 +7,7 @@ import math
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -29,6 +30,7 @@ from impostor.errors import ModelWarning, SettingsError
 if TYPE_CHECKING:
     import moderngl
 
+    from impostor.environment import Reflection
     from impostor.fan import Fan
     from impostor.lighting import DirectionalLight, Gloss
     from impostor.model import Model
@@ -65,6 +67,12 @@ def render(
     light: Lights = None,
     ambient: Annotated[float | None, typer.Option(metavar="A", help="Linear light that reaches everything.")] = None,
     gloss: Annotated[str | None, typer.Option(metavar="STRENGTH,SHININESS", help="A highlight.")] = None,
+    environment: Annotated[
+        Path | None, typer.Option(metavar="MAP", help="Light from all around, instead of the default light.")
+    ] = None,
+    reflection: Annotated[
+        str | None, typer.Option(metavar="LEAST,ROUGHNESS,METAL", help="What it mirrors of the environment.")
+    ] = None,
     method: Method = "nearest",
     output: Annotated[str, typer.Option(metavar="lit|albedo|normal|depth|alpha")] = "lit",
     no_shadow: Annotated[bool, typer.Option("--no-shadow", help="No ground and no shadow.")] = False,
@@ -80,6 +88,7 @@ def render(
         from runtime.walk_cli import render_scene
 
         of_one_object = {"--light": light, "--ambient": ambient, "--gloss": gloss, "--background": background}
+        of_one_object |= {"--environment": environment, "--reflection": reflection}
         of_one_object |= {"--azimuth": azimuth, "--elevation": elevation, "--up": up}
         of_one_object |= {"--allow-missing-textures": allow_missing_textures or None}
         for flag, value in of_one_object.items():
@@ -94,6 +103,10 @@ def render(
     width, height = _size(size)
     _check_method(method)
     options: dict[str, Any] = {"output": output, "shadow": not no_shadow}
+    if environment is not None:
+        options |= {"lights": (), "ambient": 0.0}
+    if reflection is not None:
+        options["reflection"] = _reflection(reflection, environment)
     if light:
         options["lights"] = tuple(_light(text) for text in light)
     if ambient is not None:
@@ -108,6 +121,11 @@ def render(
     viewpoint = _viewpoint(azimuth, elevation, eye, target, fov)
     check_name(output_file, ".png", force)
     loaded = _load(subject, up, allow_missing_textures)
+    if environment is not None:
+        from impostor.environment import Room
+        from impostor.files.environment_file import read_environment
+
+        settings = replace(settings, rooms=[Room.far(read_environment(environment))])
     with _context() as ctx:
         pixels = draw_picture(ctx, loaded, viewpoint(loaded, width / height), settings)
     save_png(output_file, pixels, force=force)
@@ -255,6 +273,18 @@ def _gloss(text: str) -> Gloss:
     if strength < 0 or shininess <= 0:
         raise SettingsError("--gloss", f"{text!r}; expected a strength of at least 0 and a shininess above 0")
     return Gloss(strength, shininess)
+
+
+def _reflection(text: str, environment: Path | None) -> Reflection:
+    from impostor.environment import Reflection
+
+    if environment is None:
+        raise SettingsError("--reflection", f"{text} without --environment; expected both")
+    least, roughness, metal = _numbers("--reflection", text, 3)
+    try:
+        return Reflection(least=least, roughness=roughness, metal=metal)
+    except SettingsError as error:
+        raise SettingsError("--reflection", error.problem) from None
 
 
 def _background(text: str) -> tuple[float, float, float, float]:

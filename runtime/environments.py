@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from impostor.environment.blending import EDGE
 from impostor.environment.cube import padded
 from impostor.environment.environment import Environment
-from impostor.environment.room import SHAPES, WALL, Room
+from impostor.environment.room import SHAPES, Room
 from impostor.errors import GpuError, SettingsError
 from runtime.gpu import set_uniforms
 
@@ -170,9 +170,7 @@ class RoomTable:
         radii : ndarray, (N,) float64
         """
         far = [room.shape == "far" for room in self._rooms]
-        # Far rooms light what is near a wall.
-        deep = 1 - EDGE if any(far) else 1.0
-        found = np.array([_within(room, centers, radii, deep) for room in self._rooms])
+        found = np.array([_within(room, centers, radii) for room in self._rooms])
         inside, beside = found[:, 0], found[:, 1]
         others = (~beside).sum(axis=0)
         alone = np.where(inside.any(axis=0) & (others == 1), inside.argmax(axis=0), -1)
@@ -186,17 +184,17 @@ class RoomTable:
 
 
 def _within(
-    room: Room, centers: NDArray[np.float64], radii: NDArray[np.float64], deep: float
+    room: Room, centers: NDArray[np.float64], radii: NDArray[np.float64]
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Whether spheres lie in the inner part of a room, and whether they lie beside it; for certain, (N,) each."""
+    """Whether spheres lie in a room, and whether they lie beside all that it lights; for certain, (N,) each."""
     if room.shape == "far":
         return np.zeros(len(radii), bool), np.ones(len(radii), bool)
     middles, lengths = room.in_room(centers), np.linalg.norm(room.room_from_world[:3, :3], axis=1)
     if room.shape == "sphere":
         away, reach = np.linalg.norm(middles, axis=1), radii * lengths.max()
-        return away + reach <= deep, away - reach > 1 + WALL
+        return away + reach <= 1, away - reach > 1 + EDGE
     away, reach = np.abs(middles), radii[:, None] * lengths
-    return (away + reach <= deep).all(axis=1), (away - reach > 1 + WALL).any(axis=1)
+    return (away + reach <= 1).all(axis=1), (away - reach > 1 + EDGE).any(axis=1)
 
 
 def _room_rows(room: Room, place: Place) -> NDArray[np.float64]:

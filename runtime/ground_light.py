@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from impostor.environment.blending import diffuse_weights
 from impostor.environment.bright_lights import bright_lights
 from impostor.environment.cube import sample
+from impostor.environment.environment import Environment
+from impostor.environment.light_cut import in_world
 from impostor.environment.room import Room
 from impostor.lighting import DirectionalLight
 from impostor.shadow_projection import Ground, casts_shadow
@@ -37,21 +39,18 @@ class GroundLight(NamedTuple):
 
 
 class BrightLights:
-    """The brightest lights of rooms, found once for each."""
+    """The brightest lights of rooms: found once for each environment, turned and exposed with its room."""
 
     def __init__(self):
-        self._held: dict[tuple[Hashable, int], tuple[Room, list[DirectionalLight]]] = {}
+        self._held: dict[tuple[Environment, int], list[DirectionalLight]] = {}
 
     def of(self, rooms: Sequence[Room], count: int) -> list[list[DirectionalLight]]:
         """The `count` brightest of each room; what other rooms had is forgotten."""
         if not count:
             return [[] for _ in rooms]
-        keys = [(room.key, count) for room in rooms]
-        self._held = {
-            key: self._held.get(key) or (room, bright_lights(room, count))
-            for key, room in zip(keys, rooms, strict=True)
-        }
-        return [self._held[key][1] for key in keys]
+        wanted = {(room.environment, count) for room in rooms}
+        self._held = {key: self._held[key] if key in self._held else bright_lights(*key) for key in wanted}
+        return [in_world(self._held[room.environment, count], room) for room in rooms]
 
 
 def room_diffuse(room: Room, normal: NDArray[np.floating]) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from impostor.environment import Reflection, Room
 from impostor.errors import SettingsError, ViewWarning
 from impostor.fan import Fan
 from impostor.lighting import DirectionalLight, Gloss
@@ -39,6 +40,9 @@ class PictureSettings:
     lights, ambient
         As `ImpostorRenderer` takes them.
     gloss : Gloss
+    rooms : sequence of Room
+        What else lights it, and what it mirrors.
+    reflection : Reflection, optional
     output : {"lit", "albedo", "normal", "depth", "alpha"}
         Only a lit picture has a ground. Depth is grey: white at the near end of the bounding sphere, black at its far
         end and where there is nothing.
@@ -53,6 +57,8 @@ class PictureSettings:
     lights: Sequence[DirectionalLight] = DEFAULT_LIGHTS
     ambient: ArrayLike = DEFAULT_AMBIENT
     gloss: Gloss = Gloss()  # noqa: RUF009 - frozen
+    rooms: Sequence[Room] = ()
+    reflection: Reflection | None = None
     output: str = "lit"
     shadow: bool = True
     background: tuple[float, float, float, float] = (0.72, 0.76, 0.80, 1.0)
@@ -110,11 +116,9 @@ def draw_picture(
     target = Offscreen(ctx, settings.width, settings.height, MESH_SAMPLES if isinstance(subject, Model) else 1)
     renderer = ImpostorRenderer(ctx)
     try:
-        renderer.lights, renderer.ambient = settings.lights, settings.ambient
-        if isinstance(subject, Model):
-            renderer.add_mesh(subject, gloss=settings.gloss)
-        else:
-            renderer.add(subject, gloss=settings.gloss)
+        renderer.lights, renderer.ambient, renderer.rooms = settings.lights, settings.ambient, settings.rooms
+        add = renderer.add_mesh if isinstance(subject, Model) else renderer.add
+        add(subject, gloss=settings.gloss, reflection=settings.reflection)  # type: ignore[arg-type]
         lit = settings.output == "lit"
         target.clear(settings.background if lit else (0.0, 0.0, 0.0, 0.0))
         if lit and settings.shadow:

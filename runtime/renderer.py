@@ -20,16 +20,16 @@ from impostor.shadow_projection import Ground
 from runtime.bump import Bump
 from runtime.checks import check_type, invertible
 from runtime.environments import RoomTable, check_rooms
-from runtime.fan_textures import FanTextures
 from runtime.gl_state import CallerState, preserved_state
 from runtime.grounds import GroundPass, GroundSurface, check_surface
-from runtime.impostors import Batch, ImpostorPass
+from runtime.impostors import ImpostorPass
 from runtime.instances import Instances, Viewer
 from runtime.light_settings import LightSettings
 from runtime.lights import LightTable, check_lights
-from runtime.lod import FrameClock, LevelOfDetail, Levels, check_same_object
+from runtime.lod import FrameClock, LevelOfDetail, check_same_object
 from runtime.memory import memory_held
-from runtime.meshes import OUTPUTS, MeshBuffers, MeshInstance, MeshPass, check_places
+from runtime.meshes import OUTPUTS, MeshInstance, MeshPass, check_places
+from runtime.placed import Placed
 from runtime.rooms import RoomPass, number_of, to_show
 from runtime.shadows import ShadowPass
 from runtime.surfaces import Surface, SurfacePass
@@ -81,8 +81,7 @@ class ImpostorRenderer(LightSettings):
             self._surface_pass, self._table = SurfacePass(ctx), LightTable(ctx)
             self._room_table, self._room_pass = RoomTable(ctx), RoomPass(ctx)
         self._clock, self._statistics = FrameClock(), self._mesh_pass.statistics
-        self._batches: list[Batch] = []
-        self._meshes: list[MeshInstance] = []
+        self._placed = Placed(ctx)
         self._surfaces: list[Surface] = []
 
     def add(
@@ -116,20 +115,14 @@ class ImpostorRenderer(LightSettings):
         """
         self._check_in_use()
         instances = Instances(fan, positions, yaws, scales, gloss, reflection)
-        levels = None
         if model is not None:
             check_type("model", model, Model, ", as impostor.load_model gives")
             check_same_object(fan, model)
-            settings = LevelOfDetail() if level_of_detail is None else level_of_detail
-            check_type("level_of_detail", settings, LevelOfDetail)
-            levels = Levels(instances, self._mesh_buffers(model), settings)
+            if level_of_detail is not None:
+                check_type("level_of_detail", level_of_detail, LevelOfDetail)
         elif level_of_detail is not None:
             raise SettingsError(fan.name, "a level of detail without a model; expected the model that was baked")
-        textures = next((batch.textures for batch in self._batches if batch.instances.fan is fan), None)
-        if textures is None:
-            with preserved_state(self._ctx):
-                textures = FanTextures(self._ctx, fan)
-        self._batches.append(Batch(instances, textures, levels))
+        self._placed.add(instances, model, level_of_detail)
         return instances
 
     def add_mesh(
@@ -173,8 +166,9 @@ class ImpostorRenderer(LightSettings):
             check_type("reflection", reflection, Reflection)
         if bump is not None:
             check_type("bump", bump, Bump)
-        self._meshes.append(MeshInstance(self._mesh_buffers(model, bump), matrix, gloss or Gloss(), reflection))
-        return self._meshes[-1]
+        mesh = MeshInstance(self._placed.mesh_buffers(model, bump), matrix, gloss or Gloss(), reflection)
+        self._placed.meshes.append(mesh)
+        return mesh
 
     def add_surface(
         self,
@@ -204,20 +198,9 @@ class ImpostorRenderer(LightSettings):
         if any(surface is placed for surface in self._surfaces):
             self._surfaces = [surface for surface in self._surfaces if surface is not placed]
             self._surface_pass.prepare(self._surfaces)
-        batches = [batch for batch in self._batches if batch.instances is placed]
-        meshes = [mesh for mesh in self._meshes if mesh is placed]
-        self._batches = [batch for batch in self._batches if batch.instances is not placed]
-        self._meshes = [mesh for mesh in self._meshes if mesh is not placed]
-        for batch in batches:
-            if not any(other.textures is batch.textures for other in self._batches):
-                self._impostors.forget()
-                self._shadows.forget(batch.instances.fan)
-                batch.textures.release()
-        used = self._buffers_in_use()
-        owners = [*meshes, *(batch.levels for batch in batches if batch.levels is not None)]
-        for buffers in {id(owner.buffers): owner.buffers for owner in owners}.values():
-            if id(buffers) not in used:
-                buffers.release()
+        for fan in self._placed.remove(placed):
+            self._impostors.forget()
+            self._shadows.forget(fan)
 
     def advance(self, seconds: float) -> None:
         """Tell the time that has passed since the last frame, once a frame, before it is drawn.
@@ -260,19 +243,19 @@ class ImpostorRenderer(LightSettings):
         """
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
             self._update_lights(output)
-            levels, seconds = [batch.levels for batch in self._batches if batch.levels is not None], self._clock.take()
+            levels, seconds = self._placed.levels, self._clock.take()
             for each in levels:
                 each.update(viewer, seconds)
             near = [copies for each in levels for copies in each.copies()]
             self._mesh_pass.draw_copies(state, near, viewer, self._table, self._room_table, output)
             self._statistics = self._mesh_pass.statistics
-            self._impostors.draw(state, self._batches, viewer, self._table, self._room_table, output)
+            self._impostors.draw(state, self._placed.batches, viewer, self._table, self._room_table, output)
 
     def draw_meshes(self, clip_from_view: ArrayLike, view_from_world: ArrayLike, output: str = "lit") -> None:
         """Draw the meshes that `add_mesh` placed; parameters as `draw`."""
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
             self._update_lights(output)
-            self._mesh_pass.draw(state, self._visible_meshes(), viewer, self._table, self._room_table, output)
+            self._mesh_pass.draw(state, self._placed.visible_meshes, viewer, self._table, self._room_table, output)
 
     def draw_rooms(
         self, clip_from_view: ArrayLike, view_from_world: ArrayLike, rooms: Sequence[Room] | None = None
@@ -368,23 +351,8 @@ class ImpostorRenderer(LightSettings):
         if surface is not None:
             check_type("surface", surface, GroundSurface)
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
-            fans = [batch.instances for batch in self._batches]
-            self._shadows.draw(state, fans, self._visible_meshes(), viewer, self, ground, surface)
-
-    def _visible_meshes(self) -> list[MeshInstance]:
-        return [mesh for mesh in self._meshes if mesh.visible]
-
-    def _buffers_in_use(self) -> dict[int, MeshBuffers]:
-        levels = [batch.levels for batch in self._batches if batch.levels is not None]
-        return {id(owner.buffers): owner.buffers for owner in (*self._meshes, *levels)}
-
-    def _mesh_buffers(self, model: Model, bump: Bump | None = None) -> MeshBuffers:
-        """A model's buffers, shared by everything that draws it with the same bumps."""
-        for buffers in self._buffers_in_use().values():
-            if buffers.model is model and buffers.bump is bump:
-                return buffers
-        with preserved_state(self._ctx):
-            return MeshBuffers(self._ctx, model, bump)
+            fans = [batch.instances for batch in self._placed.batches]
+            self._shadows.draw(state, fans, self._placed.visible_meshes, viewer, self, ground, surface)
 
     @contextmanager
     def _frame(self, clip_from_view: ArrayLike, view_from_world: ArrayLike) -> Iterator[tuple[CallerState, Viewer]]:
@@ -392,7 +360,7 @@ class ImpostorRenderer(LightSettings):
         self._check_in_use()
         check_lights(self._lights)
         check_rooms(self._rooms)
-        check_places(self._meshes)
+        check_places(self._placed.meshes)
         with preserved_state(self._ctx) as state:
             yield state, Viewer.from_matrices(clip_from_view, view_from_world, state.viewport)
 
@@ -426,12 +394,7 @@ class ImpostorRenderer(LightSettings):
 
     def release(self) -> None:
         """Free everything on the GPU; the context stays the caller's."""
-        for textures in {id(batch.textures): batch.textures for batch in self._batches}.values():
-            textures.release()
-        for buffers in self._buffers_in_use().values():
-            buffers.release()
-        self._batches.clear()
-        self._meshes.clear()
+        self._placed.release()
         self._surfaces.clear()
         self._released = True
         passes = self._impostors, self._mesh_pass, self._ground_pass, self._shadows, self._surface_pass

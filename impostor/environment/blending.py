@@ -11,15 +11,15 @@ from impostor.environment.room import Room
 from impostor.errors import SettingsError
 
 EDGE = 0.1
-"""A room fades in over this part of the way from its walls to its middle."""
+"""A room fades out beyond its walls over this part of the way from its middle to them."""
 
 
 def diffuse_weights(rooms: Sequence[Room], points: ArrayLike) -> NDArray[np.float64]:
     """How much of each room's diffuse light reaches points of the world.
 
-    A room of some size claims what is deeper inside than `EDGE` whole and nothing at its walls, smoothly between. Far
-    rooms share evenly what is left. Without far rooms the claims are scaled to a sum of 1, and a point outside all
-    rooms takes the nearest whole.
+    A room of some size claims what is inside whole, and what is further outside than `EDGE` not at all, smoothly
+    between. Far rooms share evenly what is left. Without far rooms the claims are scaled to a sum of 1, and a point
+    outside all rooms takes the nearest whole.
 
     Parameters
     ----------
@@ -89,11 +89,11 @@ def _far(rooms: Sequence[Room]) -> NDArray[np.bool_]:
 
 
 def _claim(room: Room, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """0 at and beyond the walls of a room to 1 inside, with a continuous slope; 0 where it is far."""
+    """1 inside and at the walls of a room to 0 outside, with a continuous slope; 0 where it is far."""
     if room.shape == "far":
         return np.zeros(points.shape[:-1])
     local = room.in_room(points)
-    depth = 1 - (np.linalg.norm(local, axis=-1, keepdims=True) if room.shape == "sphere" else np.abs(local))
+    depth = 1 + EDGE - (np.linalg.norm(local, axis=-1, keepdims=True) if room.shape == "sphere" else np.abs(local))
     share = np.clip(depth / EDGE, 0, 1)
     return np.prod(share**2 * (3 - 2 * share), axis=-1)
 

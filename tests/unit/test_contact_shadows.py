@@ -216,7 +216,7 @@ class TestCost:
             calls.append(counted.count)
             places = np.random.default_rng(3).uniform(-1, 1, (count, 3)) * (1, 0, 1)
             renderer.add(fan, places)
-            renderer.remove(renderer._batches[0].instances)
+            renderer.remove(renderer._placed.batches[0].instances)
             for place in places:
                 renderer.add_mesh(model, placed(place, place[0]))
         assert calls[0] == calls[1] == 3

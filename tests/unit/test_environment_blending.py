@@ -47,15 +47,15 @@ def test_the_light_changes_smoothly_along_a_walk_out_of_the_door():
     assert np.abs(np.diff(weights, 2, axis=0)).max() < 1e-4
 
 
-def test_deep_inside_the_room_lights_alone():
-    inside = HALL.world_from_room[:3, 3] + points(500) % 1 * [3.5, 1.7, 2.6]
+def test_inside_the_room_lights_alone_down_to_the_floor():
+    inside = [0, 0, 0] + points(500) % 1 * [4, 4, 3]
     assert np.array_equal(diffuse_weights([SKY, HALL], inside), [[0, 1]] * 500)
 
 
-def test_at_the_wall_the_sky_has_taken_over():
-    at_wall, before_it = (4, 2, 0), (4 * (1 - EDGE / 2), 2, 0)
-    weights = diffuse_weights([SKY, HALL], [at_wall, before_it])
-    assert np.allclose(weights, [[1, 0], [0.5, 0.5]])
+def test_outside_the_wall_the_sky_takes_over():
+    behind_it, away = (4 * (1 + EDGE / 2), 2, 0), (4 * (1 + EDGE), 2, 0)
+    weights = diffuse_weights([SKY, HALL], [behind_it, away])
+    assert np.allclose(weights, [[0.5, 0.5], [1, 0]])
 
 
 def test_skies_share_evenly():

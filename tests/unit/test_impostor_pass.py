@@ -185,7 +185,7 @@ class TestDepth:
         other = Sphere((0.9, 0.2, 0.3), 0.8, BLUE)
         renderer.add_mesh(solid_model(BALL, other))
         expected = draw(filling(2.0))
-        renderer.remove(renderer._meshes[0])
+        renderer.remove(renderer._placed.meshes[0])
         renderer.add(solid_fan(other, views=8, size=64))
         renderer.add(FAN)
         assert iou(bluish(draw(filling(2.0))), bluish(expected)) > 0.9
@@ -349,8 +349,8 @@ class TestCrossfade:
         for fading in ([], [39], [0, 7, 21], range(40)):
             renderer.advance(0)
             draw(matrices)
-            renderer._batches[0].levels.fan_share[:] = 1
-            renderer._batches[0].levels.fan_share[list(fading)] = self.NEARLY_ONE
+            renderer._placed.batches[0].levels.fan_share[:] = 1
+            renderer._placed.batches[0].levels.fan_share[list(fading)] = self.NEARLY_ONE
             # Tiles lie elsewhere in the cache now, which may round a colour the other way.
             assert apart(draw(matrices), expected).max() <= 3
             assert renderer.statistics["fading"] == len(fading)
@@ -361,7 +361,7 @@ class TestCrossfade:
         renderer.add(FAN, (0.2, 0.1, 0), 0.5, model=solid_model(BALL), level_of_detail=self.LEVEL)
         renderer.advance(0)
         expected = draw(filling(1.5), output)
-        renderer._batches[0].levels.fan_share[:] = self.NEARLY_ONE
+        renderer._placed.batches[0].levels.fan_share[:] = self.NEARLY_ONE
         np.testing.assert_array_equal(draw(filling(1.5), output), expected)
         assert renderer.statistics["fading"] == 1
 
@@ -427,7 +427,7 @@ class TestSizes:
         """The caller's matrices are float64; what is left of a metre there is another matter."""
         renderer.add(FAN)
         expected = draw(filling(1.5))
-        renderer.remove(renderer._batches[0].instances)
+        renderer.remove(renderer._placed.batches[0].instances)
         renderer.add(FAN, (1000, 0, 1000))
         assert (apart(draw(filling(1.5, center=(1000, 0, 1000))), expected) > 16).mean() < 0.02
 

@@ -230,10 +230,10 @@ class TestTime:
             renderer.advance(0.25)
             renderer.draw(*filling(1.5))
             renderer.draw(*filling(5.0))
-        np.testing.assert_allclose(renderer._batches[0].levels.fan_share, 0.5)
+        np.testing.assert_allclose(renderer._placed.batches[0].levels.fan_share, 0.5)
         renderer.advance(np.inf)
         renderer.draw(*filling(1.5))
-        assert renderer._batches[0].levels.fan_share == 0
+        assert renderer._placed.batches[0].levels.fan_share == 0
 
     def test_copies_that_are_added_within_a_frame_have_a_level(self, renderer, screen):
         renderer.advance(0.1)
@@ -250,7 +250,7 @@ def halves(renderer, screen, monkeypatch):
     def drawn(matrices, share):
         renderer.advance(0)
         renderer.draw(*matrices)
-        levels = renderer._batches[0].levels
+        levels = renderer._placed.batches[0].levels
         levels.fan_share = np.full(len(levels.instances), share, np.float32)
         covered = []
         for without in ("_mesh_pass.draw_copies", "_impostors.draw"):
@@ -355,7 +355,7 @@ class TestStatistics:
         found = renderer.statistics
         assert (found["meshes"], found["instances"], found["fading"]) == (2, 4, 0)
         assert (found["triangles"], found["triangles_spared"]) == (2 * triangles, 3 * triangles)
-        renderer._batches[0].instances.positions[2] = 0, 0.5, -2
+        renderer._placed.batches[0].instances.positions[2] = 0, 0.5, -2
         renderer.advance(0.5)
         renderer.draw(*matrices)
         found = renderer.statistics
@@ -367,7 +367,7 @@ class TestStatistics:
         copies = renderer.add(FAN, model=MODEL, level_of_detail=ALWAYS)
         more = renderer.add(OTHER, model=MODEL, level_of_detail=ALWAYS)
         mesh = renderer.add_mesh(MODEL)
-        assert mesh.buffers is renderer._batches[0].levels.buffers is renderer._batches[1].levels.buffers
+        assert mesh.buffers is renderer._placed.batches[0].levels.buffers is renderer._placed.batches[1].levels.buffers
         renderer.remove(copies)
         renderer.remove(more)
         renderer.draw_meshes(*filling(1.5))
@@ -385,7 +385,7 @@ def test_the_state_is_left_as_it_was(renderer, screen):
     renderer.add(OTHER, (0, 0, -2))
     renderer.advance(0)
     renderer.draw(*filling(2.0))
-    renderer._batches[0].levels.fan_share[:] = 0.5, 0, 1
+    renderer._placed.batches[0].levels.fan_share[:] = 0.5, 0, 1
     gl("glViewport", 3, 5, 40, 50)
     gl("glEnable", raw.SWITCHES["CULL_FACE"])
     gl("glCullFace", 0x0404)

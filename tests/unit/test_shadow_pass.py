@@ -361,7 +361,7 @@ class TestInTheScene:
         renderer.add(FAN)
         ground(VIEWERS["perspective"], [light_at(-50, 35)])
         shaded = screen.depth()
-        renderer.remove(renderer._batches[0].instances)
+        renderer.remove(renderer._placed.batches[0].instances)
         ground(VIEWERS["perspective"], [light_at(-50, 35)])
         np.testing.assert_array_equal(screen.depth(), shaded)
 
@@ -395,7 +395,7 @@ class TestInTheScene:
         light, matrices = light_at(-50, 50), filling(4.0, 0.3, 0.8)
         renderer.add(FAN, positions, yaws, 0.6)
         together = shadowed(ground(matrices, [light]))
-        renderer.remove(renderer._batches[0].instances)
+        renderer.remove(renderer._placed.batches[0].instances)
         alone = np.zeros_like(together)
         for position, yaw in zip(positions, yaws, strict=True):
             tree = renderer.add(FAN, position, yaw, 0.6)

@@ -73,9 +73,9 @@ vec3 mirrored_in(Room room, vec3 point, vec3 direction, float roughness, float p
     return inside ? part * room.environment_scale.w * light : vec3(room.right.w, room.up.w, room.back.w);
 }
 
-// 0 at the walls of a room and beyond, and of one that is far or absent.
+// 1 inside a room, 0 well beyond its walls, and of one that is far or absent.
 float claim_of(Room room, vec3 local) {
-    vec3 depth = is_sphere(room) ? vec3(1.0 - length(local), vec2(EDGE)) : 1.0 - abs(local);
+    vec3 depth = is_sphere(room) ? vec3(1.0 + EDGE - length(local), vec2(EDGE)) : 1.0 + EDGE - abs(local);
     vec3 share = clamp(depth / EDGE, 0.0, 1.0);
     share *= share * (3.0 - 2.0 * share);
     return is_far(room) || room.captured_at.w > 2.5 ? 0.0 : share.x * share.y * share.z;

@@ -1,0 +1,91 @@
+"""What a renderer has been given to draw: fans and meshes, and what they share on the GPU."""
+
+from __future__ import annotations
+
+import moderngl
+
+from impostor.fan import Fan
+from impostor.model import Model
+from runtime.bump import Bump
+from runtime.fan_textures import FanTextures
+from runtime.gl_state import preserved_state
+from runtime.impostors import Batch
+from runtime.instances import Instances
+from runtime.lod import LevelOfDetail, Levels
+from runtime.meshes import MeshBuffers, MeshInstance
+
+
+class Placed:
+    """Fans and meshes of a renderer; a fan's textures and a model's buffers are there once.
+
+    Parameters
+    ----------
+    ctx : moderngl.Context
+
+    Attributes
+    ----------
+    batches : list of Batch
+    meshes : list of MeshInstance
+    """
+
+    def __init__(self, ctx: moderngl.Context):
+        self._ctx = ctx
+        self.batches: list[Batch] = []
+        self.meshes: list[MeshInstance] = []
+
+    def add(self, instances: Instances, model: Model | None, level_of_detail: LevelOfDetail | None) -> None:
+        """Take copies of a fan, and the mesh that they are near the camera."""
+        fan, levels = instances.fan, None
+        if model is not None:
+            levels = Levels(instances, self.mesh_buffers(model), level_of_detail or LevelOfDetail())
+        textures = next((batch.textures for batch in self.batches if batch.instances.fan is fan), None)
+        if textures is None:
+            with preserved_state(self._ctx):
+                textures = FanTextures(self._ctx, fan)
+        self.batches.append(Batch(instances, textures, levels))
+
+    def remove(self, placed: object) -> list[Fan]:
+        """Let go of copies or of a mesh, if they are there; returns the fans that are not there any more."""
+        batches = [batch for batch in self.batches if batch.instances is placed]
+        meshes = [mesh for mesh in self.meshes if mesh is placed]
+        self.batches = [batch for batch in self.batches if batch.instances is not placed]
+        self.meshes = [mesh for mesh in self.meshes if mesh is not placed]
+        gone = [batch for batch in batches if not any(each.textures is batch.textures for each in self.batches)]
+        for batch in gone:
+            batch.textures.release()
+        used = self._buffers()
+        owners = [*meshes, *(batch.levels for batch in batches if batch.levels is not None)]
+        for key, buffers in {id(owner.buffers): owner.buffers for owner in owners}.items():
+            if key not in used:
+                buffers.release()
+        return [batch.instances.fan for batch in gone]
+
+    @property
+    def levels(self) -> list[Levels]:
+        """Of all fans that have a mesh."""
+        return [batch.levels for batch in self.batches if batch.levels is not None]
+
+    @property
+    def visible_meshes(self) -> list[MeshInstance]:
+        """Those that are drawn and cast shadows."""
+        return [mesh for mesh in self.meshes if mesh.visible]
+
+    def mesh_buffers(self, model: Model, bump: Bump | None = None) -> MeshBuffers:
+        """A model's buffers, shared by everything that draws it with the same bumps."""
+        for buffers in self._buffers().values():
+            if buffers.model is model and buffers.bump is bump:
+                return buffers
+        with preserved_state(self._ctx):
+            return MeshBuffers(self._ctx, model, bump)
+
+    def _buffers(self) -> dict[int, MeshBuffers]:
+        return {id(owner.buffers): owner.buffers for owner in (*self.meshes, *self.levels)}
+
+    def release(self) -> None:
+        """Free everything on the GPU."""
+        for textures in {id(batch.textures): batch.textures for batch in self.batches}.values():
+            textures.release()
+        for buffers in self._buffers().values():
+            buffers.release()
+        self.batches.clear()
+        self.meshes.clear()
