@@ -114,6 +114,15 @@ def room_day(studio: Studio) -> Image.Image:
     return captioned([pictures[:2], pictures[2:]], [captions[:2], captions[2:]])
 
 
+def room_study(studio: Studio) -> Image.Image:
+    """The scene of the study: a statue of gold and a polished knot in a room."""
+    walk = Walk(studio.ctx, ready_scene(SAMPLES.parent / "scenes" / "study.toml"), (1000, 500), 4)
+    walk.draw()
+    picture = Image.fromarray(walk.picture())
+    walk.release()
+    return picture
+
+
 def study() -> Environment:
     """The sample room's environment."""
     return read_environment(SAMPLES / "environments" / "study.exr")

@@ -70,6 +70,7 @@ def render(
     environment: Annotated[
         Path | None, typer.Option(metavar="MAP", help="Light from all around, instead of the default light.")
     ] = None,
+    exposure: Annotated[float | None, typer.Option(metavar="F", help="Multiplies the environment's light.")] = None,
     reflection: Annotated[
         str | None, typer.Option(metavar="LEAST,ROUGHNESS,METAL", help="What it mirrors of the environment.")
     ] = None,
@@ -88,7 +89,7 @@ def render(
         from runtime.walk_cli import render_scene
 
         of_one_object = {"--light": light, "--ambient": ambient, "--gloss": gloss, "--background": background}
-        of_one_object |= {"--environment": environment, "--reflection": reflection}
+        of_one_object |= {"--environment": environment, "--reflection": reflection, "--exposure": exposure}
         of_one_object |= {"--azimuth": azimuth, "--elevation": elevation, "--up": up}
         of_one_object |= {"--allow-missing-textures": allow_missing_textures or None}
         for flag, value in of_one_object.items():
@@ -105,6 +106,8 @@ def render(
     options: dict[str, Any] = {"output": output, "shadow": not no_shadow}
     if environment is not None:
         options |= {"lights": (), "ambient": 0.0}
+    if exposure is not None and (environment is None or not 0 <= exposure < math.inf):
+        raise SettingsError("--exposure", f"{exposure:g}; expected a number of at least 0, with --environment")
     if reflection is not None:
         options["reflection"] = _reflection(reflection, environment)
     if light:
@@ -125,7 +128,9 @@ def render(
         from impostor.environment import Room
         from impostor.files.environment_file import read_environment
 
-        settings = replace(settings, rooms=[Room.far(read_environment(environment))])
+        settings = replace(
+            settings, rooms=[Room.far(read_environment(environment), exposure=1.0 if exposure is None else exposure)]
+        )
     with _context() as ctx:
         pixels = draw_picture(ctx, loaded, viewpoint(loaded, width / height), settings)
     save_png(output_file, pixels, force=force)
