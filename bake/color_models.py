@@ -19,7 +19,9 @@ TINY = np.float32(1e-20)
 POWER = 4  # of the squares: a second colour half as strong as the first is left at 0.4 percent
 
 
-def luminance_and_color(planes: NDArray[np.float32], root: NDArray[np.float32]) -> NDArray[np.float32]:
+def luminance_and_color(
+    planes: NDArray[np.float32], scratch: NDArray[np.float32], root: NDArray[np.float32]
+) -> NDArray[np.float32]:
     """The luminance polynomial and the constant colour that together come nearest to three polynomials.
 
     Over the photographed lights, the sum of squared differences is least: the leading singular vector of the
@@ -30,6 +32,8 @@ def luminance_and_color(planes: NDArray[np.float32], root: NDArray[np.float32]) 
     ----------
     planes : ndarray of shape (6, 3, N), float32
         The RGB fit of N texels, contiguous.
+    scratch : ndarray of shape (9, 3, N), float32
+        Contiguous; written over. New memory for every block of texels would take as long as all the arithmetic.
     root : ndarray of shape (T, 6), float32
         As `light_root` gives it.
 
@@ -38,26 +42,37 @@ def luminance_and_color(planes: NDArray[np.float32], root: NDArray[np.float32]) 
     ndarray of shape (6, 3, N), float32
         `planes`, written over: luminance in [:, 0], color in [:3, 1], 0..1.
     """
-    weighted = multiply(root, planes.reshape(TERMS, -1)).reshape(-1, *planes.shape[1:])
-    squares = np.einsum("tin,tjn->ijn", weighted, weighted)
-    color = np.maximum(_leading_vector(squares), 0)  # what is below 0 there is noise
-    color /= np.maximum(np.sqrt(np.einsum("cn,cn->n", color, color)), TINY)
-    size = np.sqrt(np.maximum(np.einsum("cn,cn->n", color, _product(squares, color)), 0))
-    scale = np.minimum(size / np.float32(TYPICAL_LUMINANCE), 1 / np.maximum(color.max(axis=0), TINY))
+    terms, texels = len(root), planes.shape[2]
+    weighted, squares = scratch[:terms], scratch[TERMS:]
+    multiply(root, planes.reshape(TERMS, -1), weighted.reshape(terms, -1))
+    np.einsum("tin,tjn->ijn", weighted, weighted, out=squares)
+    length, scale, _ = scratch[2]
+    color, other = _leading_vector(squares, scratch[0], scratch[1], length)
+    np.maximum(color, 0, out=color)  # what is below 0 there is noise
+    _divide(color, np.sqrt(np.einsum("cn,cn->n", color, color, out=length), out=length))
+    np.einsum("cn,cn->n", color, np.einsum("ijn,jn->in", squares, color, out=other), out=scale)
+    np.sqrt(np.maximum(scale, 0, out=scale), out=scale)
+    scale /= np.float32(TYPICAL_LUMINANCE)
+    np.maximum(np.amax(color, axis=0, out=length), TINY, out=length)
+    np.minimum(scale, np.divide(1, length, out=length), out=scale)
     scale[scale < DARKEST] = 1
-    planes[:, 0] = np.einsum("tcn,cn->tn", planes, color / scale)
+    luminance = scratch[3:5].reshape(TERMS, texels)
+    np.einsum("tcn,cn->tn", planes, np.divide(color, scale, out=other), out=luminance)
+    planes[:, 0] = luminance
     np.multiply(color, scale, out=planes[:3, 1])
     return planes
 
 
 def luma_and_chroma(
-    planes: NDArray[np.float32], design: Design, luma_from_rgb: NDArray[np.float64]
+    planes: NDArray[np.float32], scratch: NDArray[np.float32], design: Design, luma_from_rgb: NDArray[np.float64]
 ) -> NDArray[np.float32]:
     """The luma polynomial and the mean chromaticity of three polynomials.
 
     Parameters
     ----------
     planes : ndarray of shape (6, 3, N), float32
+    scratch : ndarray of shape (9, 3, N), float32
+        As in `luminance_and_color`.
     design : Design
     luma_from_rgb : ndarray of shape (3, 4), float64
         As `ycrcb` or `principal_axes` gives it.
@@ -72,11 +87,13 @@ def luma_and_chroma(
     HPL-98-131, section 3.
     """
     matrix = luma_from_rgb.astype(np.float32)
-    luma = np.einsum("c,tcn->tn", matrix[0, :3], planes)
+    luma, mean = scratch[:2].reshape(TERMS, -1), scratch[2]
+    np.einsum("c,tcn->tn", matrix[0, :3], planes, out=luma)
     luma[5] += matrix[0, 3]
-    mean = np.einsum("t,tcn->cn", design.matrix.mean(axis=0).astype(np.float32), planes)
+    np.einsum("t,tcn->cn", design.matrix.mean(axis=0).astype(np.float32), planes, out=mean)
     planes[:, 0] = luma
-    planes[:2, 1] = np.einsum("ic,cn->in", matrix[1:, :3], mean) + matrix[1:, 3:]
+    np.einsum("ic,cn->in", matrix[1:, :3], mean, out=planes[:2, 1])
+    planes[:2, 1] += matrix[1:, 3:]
     return planes
 
 
@@ -155,18 +172,25 @@ def inverse(affine: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.column_stack([back, -back @ affine[:, 3]]).astype(np.float64)
 
 
-def _product(squares: NDArray[np.float32], vector: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Symmetric matrices (3, 3, N) times vectors (3, N)."""
-    return np.einsum("ijn,jn->in", squares, vector)
+def _leading_vector(
+    squares: NDArray[np.float32],
+    vector: NDArray[np.float32],
+    other: NDArray[np.float32],
+    length: NDArray[np.float32],
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """The direction in RGB, of any length, along which N sets of coefficients with products (3, 3, N) are largest.
 
-
-def _leading_vector(squares: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The direction in RGB along which N sets of coefficients are largest: (3, N), of any length.
-
-    By the power method, from gray: a colour has no negative part, so gray is never at right angles to it.
+    By the power method, from gray: a colour has no negative part, so gray is never at right angles to it. It is found
+    in one of two arrays (3, N); the other one is given back behind it. `length` (N,) is scratch memory.
     """
-    unit = squares / np.maximum(squares[0, 0] + squares[1, 1] + squares[2, 2], TINY)
-    vector = unit.sum(axis=1)
+    np.sum(squares, axis=1, out=vector)
     for _ in range(POWER - 1):
-        vector = _product(unit, vector)
-    return vector
+        _divide(vector, np.amax(vector, axis=0, out=length))
+        np.einsum("ijn,jn->in", squares, vector, out=other)
+        vector, other = other, vector
+    return vector, other
+
+
+def _divide(vectors: NDArray[np.float32], lengths: NDArray[np.float32]) -> None:
+    """Divide vectors (3, N) by lengths (N,), in place; a vector of no length keeps it."""
+    np.divide(vectors, np.maximum(lengths, TINY, out=lengths), out=vectors)

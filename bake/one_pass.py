@@ -17,10 +17,11 @@ from impostor.errors import SettingsError
 from impostor.ptm.polynomials import TERMS, Curve
 from impostor.srgb import linear_from_srgb
 
-# From coefficients (6, C, n) of a few texels to what is wanted of them, in the same shape.
-Turn = Callable[[NDArray[np.float32]], NDArray[np.float32]]
+# From coefficients (6, C, n) of a few texels, and scratch memory (9, C, n), to what is wanted of them: (6, C, n).
+Turn = Callable[[NDArray[np.float32], NDArray[np.float32]], NDArray[np.float32]]
+SCRATCH = 9
 
-BATCH = 25  # photographs between two visits to the accumulators, which weigh as much as 24 of them
+BATCH = 17  # photographs between two visits to the accumulators, which weigh as much as 24 of them
 BLOCK = 6400  # texels of a batch at a time: fewer lose time between calls, more fall out of the cache
 SLICES_A_WORKER = 4  # so that workers end together
 
@@ -44,8 +45,8 @@ def accumulate(
     progress : callable, optional
         Called with photographs decoded and photographs in all.
     turn : callable, optional
-        Takes the coefficients (6, C, n), float32, of a block of texels while they are still in the cache, and gives
-        what is to be returned in their place. Called in worker threads.
+        Takes the coefficients (6, C, n), float32, of a block of texels while they are still in the cache, and scratch
+        memory (9, C, n), float32; gives what is to be returned in their place. Called in worker threads.
 
     Returns
     -------
@@ -80,8 +81,13 @@ def turn_all(planes: NDArray[np.float32], turn: Turn, pool: ThreadPoolExecutor) 
     """Put in the place of coefficients (6, C, N), block by block, what is wanted of them."""
 
     def work(start: int, stop: int) -> None:
+        channels = planes.shape[1]
+        memory = np.empty((TERMS + SCRATCH) * channels * min(BLOCK, stop - start), np.float32)
         for low, high in blocks(start, stop):
-            planes[:, :, low:high] = turn(np.ascontiguousarray(planes[:, :, low:high]))
+            both = memory[: (TERMS + SCRATCH) * channels * (high - low)].reshape(-1, channels, high - low)
+            block, scratch = both[:TERMS], both[TERMS:]
+            np.copyto(block, planes[:, :, low:high])
+            planes[:, :, low:high] = turn(block, scratch)
 
     _in_slices(work, planes.shape[2], pool)
 
@@ -135,7 +141,9 @@ class _Share:
         """Add it for a slice of texels."""
         count, channels, _ = self.batch.shape
         most = min(BLOCK, stop - start) * channels
-        value_memory, share_memory = np.empty(count * most, np.float32), np.empty(TERMS * most, np.float32)
+        # The photographs' values are spent when the coefficients are turned: their memory is scratch then.
+        value_memory = np.empty(max(count, SCRATCH) * most, np.float32)
+        share_memory = np.empty(TERMS * most, np.float32)
         for low, high in blocks(start, stop):
             length = channels * (high - low)
             values = value_memory[: count * length].reshape(count, channels, high - low)
@@ -149,6 +157,6 @@ class _Share:
             if self.begun:
                 np.add(planes, share, out=planes if self.turn is None else share)
             if self.turn is not None:
-                planes[:] = self.turn(share)
+                planes[:] = self.turn(share, value_memory[: SCRATCH * length].reshape(SCRATCH, channels, high - low))
             elif not self.begun:
                 planes[:] = share

@@ -146,6 +146,8 @@ def info(
         if up is not None:
             raise SettingsError("--up", f"given with {file}; expected it with a model")
         summary = ptm_summary(file)
+    elif file.suffix.lower() in (".hdr", ".exr"):
+        raise SettingsError(str(file), "is an environment map; expected `impostor environment info` for it")
     else:
         from impostor.summary import model_summary
 

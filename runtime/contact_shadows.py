@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple, Protocol
@@ -28,7 +28,7 @@ ONE, ONE_MINUS_SOURCE_COLOR = 1, 0x0301
 CONTACT_DTYPE = np.dtype(
     [("origin", "f4", (3,)), ("along_u", "f4", (3,)), ("along_v", "f4", (3,)), ("lift", "f4"), ("rows", "f4", (4, 4))]
 )
-TURNS = 32  # steps of the up direction between which a mesh keeps its footprint
+TURNS = 12  # steps of the up direction between which a mesh keeps its footprint
 MOST_FOOTPRINTS = 64  # of one mesh, each turned another way
 
 
@@ -99,6 +99,7 @@ class ContactPass:
         layout = [(self._corners, "2f", "corner"), (self._records.buffer, "3f 3f 3f 1f 4f 4f 4f 4f/i", *names)]
         self._array = ctx.vertex_array(self._program, layout)
         self._held: dict[tuple[object, ...], tuple[Fan | MeshBuffers, Footprint, moderngl.Texture]] = {}
+        self._reach = 0.0
 
     def draw(
         self,
@@ -120,6 +121,9 @@ class ContactPass:
         settings : ContactShadows
         """
         hulls = []
+        if settings.reach != self._reach:
+            self._drop(list(self._held))
+            self._reach = settings.reach
         set_uniforms(self._program, clip_from_world=clip_from_world, footprint=0)
         self._keep_meshes([group.copies.buffers for group in groups if isinstance(group.copies, MeshCopies)])
         for group in groups:
@@ -135,13 +139,15 @@ class ContactPass:
                     hulls.append(hull[chosen])
         return hulls
 
-    def _placed(self, copies: CastingFan | MeshCopies, ground: Ground, reach: float) -> list[_Placed]:
+    def _placed(self, copies: CastingFan | MeshCopies, ground: Ground, reach: float) -> Iterator[_Placed]:
+        """One at a time: the footprint of one may push out that of another, which is drawn by then."""
         if isinstance(copies, CastingFan):
             fan, index = copies.instances.fan, copies.seen.index
-            held = self._footprint((id(fan), reach), fan, partial(fan_footprint, fan, reach))
+            held = self._footprint((id(fan),), fan, partial(fan_footprint, fan, reach))
             axes = copies.seen.scale[:, None, None] * rotation_about_y(copies.instances.yaws[index]).swapaxes(1, 2)
-            return [_Placed(*held, copies.instances.positions[index], axes, copies.records["rows"])]
-        placed, linear = [], copies.world_from_model[:, :3, :3]
+            yield _Placed(*held, copies.instances.positions[index], axes, copies.records["rows"])
+            return
+        linear = copies.world_from_model[:, :3, :3]
         up = ground.normal @ linear
         turns, of_each = np.unique(
             np.rint(up / np.linalg.norm(up, axis=1)[:, None] * TURNS), axis=0, return_inverse=True
@@ -149,11 +155,10 @@ class ContactPass:
         for number, turn in enumerate(turns):
             which, axes = np.flatnonzero(of_each.ravel() == number), _axes_about(turn)
             make = partial(model_footprint, copies.buffers.model, axes, reach)
-            held = self._footprint((id(copies.buffers), reach, *turn.tolist()), copies.buffers, make)
+            held = self._footprint((id(copies.buffers), *turn.tolist()), copies.buffers, make)
             turned = (linear[which] @ axes.T).swapaxes(1, 2)
             rows = np.broadcast_to(np.eye(4), (len(which), 4, 4))
-            placed.append(_Placed(*held, copies.world_from_model[which, :3, 3], turned, rows))
-        return placed
+            yield _Placed(*held, copies.world_from_model[which, :3, 3], turned, rows)
 
     def _footprint(
         self, key: tuple[object, ...], owner: Fan | MeshBuffers, make: Callable[[], Footprint]

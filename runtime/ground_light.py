@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from impostor.environment.blending import diffuse_weights
 from impostor.environment.bright_lights import bright_lights
-from impostor.environment.cube import sample
+from impostor.environment.colormap import diffuse_light
 from impostor.environment.environment import Environment
 from impostor.environment.light_cut import in_world
 from impostor.environment.room import Room
@@ -56,7 +56,7 @@ class BrightLights:
 def room_diffuse(room: Room, normal: NDArray[np.floating]) -> NDArray[np.float64]:
     """Diffuse light (3,) of a room on a surface with this normal."""
     toward = room.environment_from_world @ normal
-    return room.exposure * sample(room.environment.diffuse, toward).astype(np.float64)
+    return room.exposure * diffuse_light(room.environment, toward).astype(np.float64)
 
 
 def ground_light(

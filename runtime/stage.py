@@ -250,9 +250,13 @@ class Stage:
             self._draw_beneath(camera, "lit", True)
             renderer.draw(*camera.matrices)
 
-        self._rooms.capture(self._ctx, draw, 2 * self._sphere[1] + 1)
-        for mesh in self._meshes.things.values():
-            mesh.visible = True
+        try:
+            self._rooms.capture(self._ctx, draw, lambda eye: self.range_from(eye)[1])
+        finally:
+            for mesh in self._meshes.things.values():
+                mesh.visible = True
+        # The captures have chosen levels of detail for their own cameras; the picture chooses anew.
+        renderer.advance(np.inf)
 
     def triangles_not_drawn(self, camera: Camera, size: tuple[int, int]) -> int:
         """Of all meshes whose fans are seen in a picture of `size` pixels.

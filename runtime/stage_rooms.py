@@ -61,7 +61,7 @@ class StageRooms:
         """Whether a room still waits for what is seen from its middle."""
         return None in self._environments
 
-    def capture(self, ctx: moderngl.Context, draw: DrawScene, far: float) -> None:
+    def capture(self, ctx: moderngl.Context, draw: DrawScene, far: Callable[[NDArray[np.float64]], float]) -> None:
         """Fill the rooms that have no map with what is seen from their middles.
 
         Parameters
@@ -70,20 +70,21 @@ class StageRooms:
         draw : callable
             Draws the scene without what mirrors, with `clip_from_view` and `view_from_world`, into the bound
             framebuffer.
-        far : float
-            Metres to the far plane.
+        far : callable
+            Metres to the far plane, for an eye (3,).
         """
         for number, described in enumerate(self._described):
             if self._environments[number] is None:
-                self._environments[number] = capture_environment(
-                    ctx, draw, described.position, CAPTURED_SIZE, NEAREST, far, rotation_about_y(described.yaw).T
-                )
+                eye, turn = np.array(described.position), rotation_about_y(described.yaw).T
+                self._environments[number] = capture_environment(ctx, draw, eye, CAPTURED_SIZE, NEAREST, far(eye), turn)
         self.turn(self._yaws)
 
     def corners(self) -> NDArray[np.float64]:
-        """Of the boxes around all rooms of some size, (K, 3), world space."""
-        unit = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1], [1])).reshape(4, -1)
-        found = [(np.asarray(room.world_from_room) @ unit)[:3].T for room in self.all if room.shape != "far"]
+        """Of cubes around all rooms of some size, however they turn, (K, 3), world space."""
+        unit = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+        found = [
+            room.position + unit * np.linalg.norm(room.size) / 2 for room in self._described if room.shape != "far"
+        ]
         return np.concatenate(found) if found else np.empty((0, 3))
 
 

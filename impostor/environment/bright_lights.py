@@ -133,16 +133,9 @@ def _light(
     # An even disc shines equally on all of its solid angle.
     solid_angle = shine.sum() ** 2 / (shine**2 / angles).sum()
     softness = min(float(np.arccos(1 - min(solid_angle / (2 * np.pi), 1))), WIDEST)
-    x, y, z = _in_world(room, middle).tolist()
+    x, y, z = room.world_directions(middle).tolist()
     red, green, blue = color.tolist()
     return DirectionalLight((x, y, z), (red, green, blue), softness)
-
-
-def _in_world(room: Room, direction: NDArray[np.floating]) -> NDArray[np.floating]:
-    """From the environment's axes to the world's, of any length but 0."""
-    if room.shape == "far":
-        return room.environment_from_world.T @ direction
-    return np.asarray(room.world_from_room)[:3, :3] @ np.linalg.solve(room.environment_from_room, direction)
 
 
 def _bell(deviation: float, environment: Environment) -> Lobe:

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from impostor.environment.cube import face_directions, solid_angles
+from impostor.environment.bright_lights import LUMINANCE
+from impostor.environment.cube import reduced
 from impostor.environment.environment import Environment
 from impostor.environment.room import Room
 from impostor.errors import SettingsError
 from impostor.lighting import DirectionalLight
 
 FINEST = 64  # texels along a face: finer ones are put together first
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 def light_cut(environment: Environment, count: int) -> list[DirectionalLight]:
@@ -60,7 +60,7 @@ def in_world(lights: Sequence[DirectionalLight], room: Room, share: float = 1.0)
     """Lights of a room's environment as the room turns and exposes them, `share` of their light."""
     if not lights:
         return []
-    toward = np.array([light.toward for light in lights]) @ room.environment_from_world
+    toward = room.world_directions([light.toward for light in lights])
     color = np.array([light.color for light in lights]) * (room.exposure * share)
     return [
         DirectionalLight((x, y, z), (red, green, blue), light.softness)
@@ -70,16 +70,8 @@ def in_world(lights: Sequence[DirectionalLight], room: Room, share: float = 1.0)
 
 def _texels(environment: Environment) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Where the texels are that shine, (K, 3), and with what irradiance / pi on what faces them, (K, 3)."""
-    faces, size = environment.faces, environment.size
-    power = faces.astype(np.float64) * solid_angles(size)[..., None]
-    # What a coarse texel shines comes from where the fine ones in it are bright.
-    moments = (power @ LUMINANCE)[..., None] * face_directions(size)
-    if size > FINEST:
-        split = (6, FINEST, size // FINEST, FINEST, size // FINEST, 3)
-        power, moments = (each.reshape(split).sum(axis=(2, 4)) for each in (power, moments))
-    power, moments = power.reshape(-1, 3) / np.pi, moments.reshape(-1, 3)
-    lengths = np.linalg.norm(moments, axis=-1, keepdims=True)
-    return moments / np.maximum(lengths, 1e-30), power
+    power, toward = reduced(environment.faces, min(environment.size, FINEST))
+    return toward.reshape(-1, 3), power.reshape(-1, 3) / np.pi
 
 
 def _brightness(power: NDArray[np.float64]) -> float:

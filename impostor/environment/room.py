@@ -134,6 +134,13 @@ class Room:
             return np.eye(3)
         return np.diag(np.linalg.norm(np.asarray(self.world_from_room)[:3, :3], axis=0))
 
+    def world_directions(self, directions: ArrayLike) -> NDArray[np.float64]:
+        """Directions of the environment (..., 3), as seen from `captured_at`, in the world; of any length but 0."""
+        room = np.asarray(directions, np.float64) / np.diag(self.environment_from_room)
+        if self.shape == "far":
+            return np.asarray(directions, np.float64) @ self.environment_from_world
+        return room @ np.asarray(self.world_from_room)[:3, :3].T
+
     @property
     def key(self) -> Hashable:
         """Equal for rooms that light and mirror alike."""

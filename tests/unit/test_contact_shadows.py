@@ -266,3 +266,23 @@ def test_nothing_to_stand_on_is_nothing(renderer, hidden):
     renderer.add(replace(empty, silhouette=np.zeros_like(empty.silhouette)))
     renderer.add_mesh(solid_model(Box((-0.3, 0, -0.3), (0.3, 0, 0.3))))
     np.testing.assert_array_equal(hidden(), 0)
+
+
+def test_more_ways_of_leaning_than_footprints_are_kept_are_all_drawn(renderer, hidden, monkeypatch):
+    monkeypatch.setattr(contact_shadows, "MOST_FOOTPRINTS", 2)
+    model = solid_model(CUBE)
+    places = [(x, 0.0, z) for x in (-0.65, 0.0, 0.65) for z in (-0.5, 0.5)]
+    for number, place in enumerate(places):
+        leaning = placed(place)
+        sin, cos = np.sin(0.12 * number), np.cos(0.12 * number)
+        leaning[:3, :3] = [[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]]
+        renderer.add_mesh(model, leaning)
+    hidden()
+    picture = hidden()
+    assert all(at(picture, x, z) > 0.2 for x, _, z in places)
+
+
+def test_another_reach_counts_at_once(renderer, hidden):
+    renderer.add_mesh(solid_model(CUBE))
+    near, far = hidden(ContactShadows(reach=0.1)), hidden(ContactShadows(reach=1.0))
+    assert at(far, 0.4) > at(near, 0.4) + 0.05

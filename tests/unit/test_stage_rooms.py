@@ -117,3 +117,13 @@ def test_a_map_that_cannot_be_read_is_refused_by_name(see, folder):
     (folder / "broken.exr").write_bytes(b"v/1\x01 and no more")
     with pytest.raises(EnvironmentFileError, match=r"broken\.exr"):
         see('[[room]]\nenvironment = "broken.exr"\n')
+
+
+def test_a_camera_sees_as_far_as_the_walls_of_a_room_not_yet_captured(ctx, folder):
+    from impostor.files.scene_file import load_scene
+
+    room = '[[room]]\nshape = "box"\nsize = [60, 30, 60]\nposition = [0, 0, 0]\n'
+    (folder / "scene.toml").write_text(SCENE + room + '[[mesh]]\nmodel = "box.ply"\n')
+    stage = Stage(ctx, load_scene(folder / "scene.toml"))
+    assert stage.range_from(np.zeros(3))[1] > np.linalg.norm([30, 15, 30])
+    stage.release()
