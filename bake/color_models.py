@@ -55,7 +55,7 @@ def luminance_and_color(
     scale /= np.float32(TYPICAL_LUMINANCE)
     np.maximum(np.amax(color, axis=0, out=length), TINY, out=length)
     np.minimum(scale, np.divide(1, length, out=length), out=scale)
-    scale[scale < DARKEST] = 1
+    np.maximum(scale, DARKEST, out=scale)
     luminance = scratch[3:5].reshape(TERMS, texels)
     np.einsum("tcn,cn->tn", planes, np.divide(color, scale, out=other), out=luminance)
     planes[:, 0] = luminance
@@ -184,10 +184,11 @@ def _leading_vector(
     in one of two arrays (3, N); the other one is given back behind it. `length` (N,) is scratch memory.
     """
     np.sum(squares, axis=1, out=vector)
-    for _ in range(POWER - 1):
-        _divide(vector, np.amax(vector, axis=0, out=length))
+    for power in range(2, POWER + 1):
         np.einsum("ijn,jn->in", squares, vector, out=other)
         vector, other = other, vector
+        if power == POWER // 2:  # as high as dark texels allow
+            _divide(vector, np.amax(vector, axis=0, out=length))
     return vector, other
 
 

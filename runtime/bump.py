@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from impostor.errors import SettingsError
 from impostor.model import Model, Primitive
+from runtime.checks import check_number
 from runtime.gpu import check_texture_size
 from runtime.tangents import tangent_mesh
 
@@ -50,8 +51,7 @@ class Bump:
             raise SettingsError("bump", f"a picture that is a {type(picture).__name__}; expected an array")
         if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] != 3 or not picture.size:
             raise SettingsError("bump", f"a picture of {picture.shape} {picture.dtype}; expected (H, W, 3) uint8")
-        if not np.isfinite(self.bumpiness):
-            raise SettingsError("bump", f"bumpiness {self.bumpiness}; expected a finite number")
+        check_number("bump", "bumpiness", self.bumpiness)
 
 
 def bump_texture(ctx: moderngl.Context, bump: Bump) -> moderngl.Texture:

@@ -106,8 +106,8 @@ def render(
     options: dict[str, Any] = {"output": output, "shadow": not no_shadow}
     if environment is not None:
         options |= {"lights": (), "ambient": 0.0}
-    if exposure is not None and (environment is None or not 0 <= exposure < math.inf):
-        raise SettingsError("--exposure", f"{exposure:g}; expected a number of at least 0, with --environment")
+    if exposure is not None and (environment is None or not 0 < exposure < math.inf):
+        raise SettingsError("--exposure", f"{exposure:g}; expected a number above 0, with --environment")
     if reflection is not None:
         options["reflection"] = _reflection(reflection, environment)
     if light:

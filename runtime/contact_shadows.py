@@ -11,10 +11,10 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from impostor.errors import SettingsError
 from impostor.fan import Fan
 from impostor.shadow_projection import Ground
 from impostor.views import rotation_about_y
+from runtime.checks import check_number
 from runtime.footprints import LIFTS, SIDE, Footprint, fan_footprint, model_footprint
 from runtime.gl_state import set_state
 from runtime.gpu import InstanceBuffer, load_program, set_uniforms
@@ -57,10 +57,8 @@ class ContactShadows:
     reach: float = 0.25
 
     def __post_init__(self):
-        for name, least in (("strength", "from 0"), ("reach", "above 0")):
-            value = getattr(self, name)
-            if not (0 <= value <= 1 and (name == "strength" or value > 0)):
-                raise SettingsError("contact shadows", f"{name} {value}; expected a number {least} to 1")
+        check_number("contact shadows", "strength", self.strength, 0, 1)
+        check_number("contact shadows", "reach", self.reach, 0, 1, above=True)
 
 
 class CopiesGroup(Protocol):

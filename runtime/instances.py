@@ -49,7 +49,7 @@ class Instances:
     ------
     SettingsError
         No fan, arrays whose lengths differ, a number that is not finite, a scale that is not positive. Also where an
-        array is replaced; of what is written into one, copies that cannot be drawn are left out.
+        array or the reflection is replaced; of what is written into one, copies that cannot be drawn are left out.
     """
 
     def __init__(
@@ -64,8 +64,6 @@ class Instances:
         check_type("fan", fan, Fan, ", as impostor.load gives")
         self.fan, self.gloss, self.reflection = fan, gloss or Gloss(), reflection
         check_type("gloss", self.gloss, Gloss)
-        if reflection is not None:
-            check_type("reflection", reflection, Reflection)
         self._positions = np.array(numbers(fan.name, "positions", positions, (-1, 3), (3,), (0,)).reshape(-1, 3))
         count = len(self._positions)
         self._yaws, self._scales, self._visible = np.zeros(count), np.ones(count), np.ones(count, bool)
@@ -73,6 +71,16 @@ class Instances:
         self.yaws, self.scales = yaws, scales
         self.view_vectors = ViewVectors(fan.views)
         self._placed: tuple[tuple[bytes, ...], Placement] | None = None
+
+    @property
+    def reflection(self) -> Reflection | None:
+        return self._reflection
+
+    @reflection.setter
+    def reflection(self, reflection: Reflection | None) -> None:
+        if reflection is not None:
+            check_type("reflection", reflection, Reflection)
+        self._reflection = reflection
 
     @property
     def positions(self) -> NDArray[np.float64]:

@@ -64,10 +64,11 @@ class LightSettings:
 
     @shadow_lights.setter
     def shadow_lights(self, count: int) -> None:
-        check_type("shadow_lights", count, int)
+        if isinstance(count, bool) or not isinstance(count, int | np.integer):
+            raise SettingsError("shadow_lights", f"a {type(count).__name__}; expected an int")
         if count < 0:
             raise SettingsError("shadow_lights", f"{count}; expected a number of at least 0")
-        self._shadow_lights = count
+        self._shadow_lights = int(count)
 
     @property
     def contact_shadows(self) -> ContactShadows | None:

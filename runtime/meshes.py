@@ -13,7 +13,7 @@ from impostor.environment.reflection import Reflection
 from impostor.lighting import Gloss
 from impostor.model import Material, Model, Primitive
 from runtime.bump import Bump, bump_texture, with_tangents
-from runtime.checks import numbers
+from runtime.checks import check_type, numbers
 from runtime.environments import RoomTable
 from runtime.gl_state import CallerState, set_state
 from runtime.gpu import SRGB8_ALPHA8, InstanceBuffer, check_texture_size, load_program, set_uniforms
@@ -151,8 +151,8 @@ class MeshInstance:
     visible: bool = True
 
 
-def check_places(meshes: Sequence[MeshInstance]) -> None:
-    """Refuse a `world_from_model` that has become something else than a finite (4, 4) matrix.
+def check_meshes(meshes: Sequence[MeshInstance]) -> None:
+    """Refuse a `world_from_model` that has become no finite (4, 4) matrix, and a `reflection` that is none.
 
     Raises
     ------
@@ -165,6 +165,9 @@ def check_places(meshes: Sequence[MeshInstance]) -> None:
     if len(meshes) and (matrices.shape != (len(meshes), 4, 4) or not np.isfinite(matrices).all()):
         for mesh in meshes:
             numbers(mesh.buffers.model.name, "world_from_model", mesh.world_from_model, (4, 4))
+    for mesh in meshes:
+        if mesh.reflection is not None:
+            check_type("reflection", mesh.reflection, Reflection)
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ from runtime.light_settings import LightSettings
 from runtime.lights import LightTable, check_lights
 from runtime.lod import FrameClock, LevelOfDetail, check_same_object
 from runtime.memory import memory_held
-from runtime.meshes import OUTPUTS, MeshInstance, MeshPass, check_places
+from runtime.meshes import OUTPUTS, MeshInstance, MeshPass, check_meshes
 from runtime.placed import Placed
 from runtime.rooms import RoomPass, number_of, to_show
 from runtime.shadows import ShadowPass
@@ -273,9 +273,11 @@ class ImpostorRenderer(LightSettings):
         Raises
         ------
         SettingsError
-            A room that is not among `rooms`.
+            No list of rooms; a room that is not among `rooms`.
         """
-        numbered = {number_of(self._rooms, room): room for room in (self._rooms if rooms is None else rooms)}
+        shown = self._rooms if rooms is None else rooms
+        check_rooms(shown)
+        numbered = {number_of(self._rooms, room): room for room in shown}
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
             self._room_table.update(self._rooms)
             self._room_pass.draw(state, numbered, self._room_table, viewer)
@@ -360,7 +362,7 @@ class ImpostorRenderer(LightSettings):
         self._check_in_use()
         check_lights(self._lights)
         check_rooms(self._rooms)
-        check_places(self._placed.meshes)
+        check_meshes(self._placed.meshes)
         with preserved_state(self._ctx) as state:
             yield state, Viewer.from_matrices(clip_from_view, view_from_world, state.viewport)
 
@@ -390,6 +392,7 @@ class ImpostorRenderer(LightSettings):
     @property
     def memory(self) -> dict[str, int]:
         """Bytes that are held on the GPU, by kind; see `runtime.memory.memory_held`."""
+        self._check_in_use()
         return memory_held(self)
 
     def release(self) -> None:

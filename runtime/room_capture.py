@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from impostor.environment.cube import FACE_AXES
-from impostor.environment.environment import Environment
+from impostor.environment.environment import FACE_SIZES, Environment, is_face_size
 from impostor.errors import SettingsError
 from impostor.srgb import linear_from_srgb
 from runtime.checks import numbers
@@ -40,7 +40,7 @@ def capture_environment(
     position : array_like, (3,) float
         World space, metres. A room that shows the environment has this point, in room space, as `captured_at`.
     size : int
-        Of a face in texels; a power of two. Each is the mean of four.
+        Of a face in texels; a power of two from 8 to 4096. Each is the mean of four.
     near, far : float
         Metres.
     environment_from_world : array_like, (3, 3) float, optional
@@ -61,6 +61,8 @@ def capture_environment(
     ----------
     Bjorke, "Image-Based Lighting", GPU Gems 19, section 19.6: cube maps made from 3D geometry.
     """
+    if not is_face_size(size):
+        raise SettingsError("capture", f"size {size!r}; expected {FACE_SIZES}")
     eye = numbers("capture", "position", position, (3,))
     turn = np.eye(3) if environment_from_world is None else environment_from_world
     turn = numbers("capture", "environment_from_world", turn, (3, 3))

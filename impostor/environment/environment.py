@@ -14,6 +14,12 @@ from impostor.environment.prefilter import prefiltered
 from impostor.errors import SettingsError
 
 MIN_FACE, MAX_FACE = 8, 4096
+FACE_SIZES = f"a power of two from {MIN_FACE} to {MAX_FACE}"
+
+
+def is_face_size(size: object) -> bool:
+    """Whether faces may have that side, in texels: FACE_SIZES."""
+    return isinstance(size, int | np.integer) and MIN_FACE <= int(size) <= MAX_FACE and not int(size) & (int(size) - 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +45,8 @@ class Environment:
     def __post_init__(self):
         faces = np.array(self.faces, np.float32, order="C")
         size = faces.shape[1] if faces.ndim == 4 else 0
-        if faces.shape != (6, size, size, 3) or not MIN_FACE <= size <= MAX_FACE or size & (size - 1):
-            wanted = f"(6, N, N, 3), N a power of two from {MIN_FACE} to {MAX_FACE}"
-            raise SettingsError(self.name, f"faces of shape {faces.shape}; expected {wanted}")
+        if faces.shape != (6, size, size, 3) or not is_face_size(size):
+            raise SettingsError(self.name, f"faces of shape {faces.shape}; expected (6, N, N, 3), N {FACE_SIZES}")
         if not np.isfinite(faces).all() or faces.min() < 0:
             raise SettingsError(self.name, "radiance that is negative or not finite; expected numbers of at least 0")
         faces.flags.writeable = False

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from impostor.errors import SettingsError
+from impostor.checks import check_number
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Reflection:
     Raises
     ------
     SettingsError
-        A number outside its range.
+        What is no number, or one outside its range.
 
     References
     ----------
@@ -49,8 +49,7 @@ class Reflection:
     def __post_init__(self):
         ranges = {"strength": 1, "least": 1, "exponent": 64, "roughness": 1, "metal": 1}
         for name, high in ranges.items():
-            if not 0 <= getattr(self, name) <= high:
-                raise SettingsError("reflection", f"{name} {getattr(self, name)}; expected a number from 0 to {high}")
+            check_number("reflection", name, getattr(self, name), 0, high)
 
     def fresnel(self, facing: ArrayLike) -> NDArray[np.float64]:
         """Part of the light that is mirrored, where `facing` is the cosine between the normal and the viewer."""

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from impostor.checks import check_number, check_type, numbers
 from impostor.environment.environment import Environment
 from impostor.errors import SettingsError
 from impostor.views import rotation_about_y
@@ -46,8 +47,8 @@ class Room:
     Raises
     ------
     SettingsError
-        A number that is not finite; a matrix without an inverse, that mirrors, or whose axes are not at right angles;
-        a place of capture that is outside.
+        What is no Environment; a number that is none or not finite; a matrix without an inverse, that mirrors, or whose
+        axes are not at right angles; a place of capture that is outside.
 
     References
     ----------
@@ -63,24 +64,25 @@ class Room:
     outside: Vector = (1.0, 0.0, 0.0)
 
     def __post_init__(self):
+        check_type("environment", self.environment, Environment, ", as impostor.load_environment gives")
         if self.shape not in SHAPES:
             raise SettingsError("room", f"shape {self.shape!r}; expected one of {', '.join(SHAPES)}")
-        matrix = np.array(np.eye(4) if self.world_from_room is None else self.world_from_room, np.float64)
-        if matrix.shape != (4, 4) or not np.isfinite(matrix).all() or np.any(matrix[3] != (0, 0, 0, 1)):
-            raise SettingsError("room", "world_from_room is no finite affine (4, 4) matrix")
+        given = np.eye(4) if self.world_from_room is None else self.world_from_room
+        matrix = np.array(numbers("room", "world_from_room", given, (4, 4)))
+        if np.any(matrix[3] != (0, 0, 0, 1)):
+            raise SettingsError("room", "world_from_room is not affine; expected (0, 0, 0, 1) as its last row")
         across = matrix[:3, :3].T @ matrix[:3, :3]
         lengths = np.sqrt(np.diag(across))
         if not (lengths.min() > 0 and np.linalg.det(matrix[:3, :3]) > 0):
             raise SettingsError("room", "world_from_room mirrors or has no inverse; expected a rotation and sizes")
         if np.abs(across / np.outer(lengths, lengths) - np.eye(3)).max() > 1e-6:
             raise SettingsError("room", "world_from_room has axes that are not at right angles")
-        if not 0 <= self.exposure < np.inf:
-            raise SettingsError("room", f"exposure {self.exposure}; expected a number of at least 0")
-        outside = np.asarray(self.outside, np.float64)
-        if outside.shape != (3,) or not np.isfinite(outside).all() or outside.min() < 0:
+        check_number("room", "exposure", self.exposure, 0)
+        outside = numbers("room", "outside", self.outside, (3,))
+        if outside.min() < 0:
             raise SettingsError("room", f"outside {self.outside}; expected three finite numbers, none negative")
-        captured = np.asarray(self.captured_at, np.float64)
-        if captured.shape != (3,) or not np.isfinite(captured).all() or not self._within(captured):
+        captured = numbers("room", "captured_at", self.captured_at, (3,))
+        if not self._within(captured):
             raise SettingsError("room", f"captured_at {self.captured_at}; expected a point inside, in room space")
         matrix.flags.writeable = False
         object.__setattr__(self, "world_from_room", matrix)
@@ -102,7 +104,9 @@ class Room:
         exposure: float = 1.0,
     ) -> Room:
         """A box of some width, height and depth in metres around a position."""
-        return cls(environment, "box", _placed(np.divide(size, 2), position, yaw), exposure=exposure)
+        return cls(
+            environment, "box", _placed(numbers("room", "size", size, (3,)) / 2, position, yaw), exposure=exposure
+        )
 
     @classmethod
     def sphere(
@@ -114,6 +118,7 @@ class Room:
         exposure: float = 1.0,
     ) -> Room:
         """A sphere of some radius in metres around a position."""
+        check_number("room", "radius", radius, 0, above=True)
         return cls(environment, "sphere", _placed((radius,) * 3, position, yaw), exposure=exposure)
 
     @cached_property
@@ -214,7 +219,8 @@ def _to_box(start: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[n
 
 
 def _placed(half_sizes: ArrayLike, position: ArrayLike, yaw: float) -> NDArray[np.float64]:
+    check_number("room", "yaw", yaw)
     matrix = np.eye(4)
     matrix[:3, :3] = rotation_about_y(yaw) * np.asarray(half_sizes, np.float64)
-    matrix[:3, 3] = position
+    matrix[:3, 3] = numbers("room", "position", position, (3,))
     return matrix

@@ -20,6 +20,7 @@ GREY, WHITE = 0.3, 6.0  # what the geometric mean is shown as, and what is shown
 HEIGHT, BALL = 512, 320
 BACKGROUND = 0.06
 MARK, RADIUS = (1.0, 0.1, 0.05), 16
+EVEN = 1e-3  # part of the largest luminance by which an environment without a brightest direction may differ
 MEASURED, SHOWN = 512, 256  # faces: larger ones would take many times as long to say and show the same
 
 
@@ -45,7 +46,7 @@ def environment_summary(environment: Environment, lights: Sequence[DirectionalLi
         "mean_luminance": _short(total),
         "largest_luminance": _short(high),
         "stops": round(float(np.log2(high / low)), 1) if low > 0 else None,
-        "brightest_direction": _angles(brightest_direction(measured)) if total else None,
+        "brightest_direction": _angles(brightest_direction(measured)) if np.ptp(luminance) > EVEN * high else None,
         "harmonics_error_percent": _short(100 * np.abs((nine - exact) @ LUMINANCE).max() / strongest) if total else 0.0,
         "lights": [
             {

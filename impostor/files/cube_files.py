@@ -62,9 +62,11 @@ def find_faces(path: Path) -> list[Path]:
     Raises
     ------
     EnvironmentFileError
-        A face is missing, or there more than once.
+        A face is missing, or there more than once; more than one `*`.
     """
     pattern = None if path.is_dir() else path.name.lower()
+    if pattern is not None and pattern.count("*") > 1:
+        raise EnvironmentFileError(path, "has more than one *; expected one, for the name of the face")
     folder = path if pattern is None else path.parent
     if not folder.is_dir():
         raise EnvironmentFileError(path, f"directory {str(folder)!r} does not exist; expected one that does")

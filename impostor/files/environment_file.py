@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impostor.environment import Environment
-from impostor.environment.environment import MAX_FACE, MIN_FACE
+from impostor.environment.environment import FACE_SIZES, is_face_size
 from impostor.environment.panorama import (
     default_size,
     faces_from_panorama,
@@ -73,8 +73,8 @@ def read_environment(
     SettingsError
         A size or an exposure that cannot be.
     """
-    if size is not None and (not MIN_FACE <= size <= MAX_FACE or size & (size - 1)):
-        raise SettingsError("size", f"{size}; expected a power of two from {MIN_FACE} to {MAX_FACE}")
+    if size is not None and not is_face_size(size):
+        raise SettingsError("size", f"{size}; expected {FACE_SIZES}")
     if not 0 < exposure < np.inf:
         raise SettingsError("exposure", f"{exposure:g}; expected a number above 0")
     place = Path(path)
@@ -84,6 +84,9 @@ def read_environment(
         faces = _of_one_picture(place, size, mirrored)
     if flip_y:
         faces = flipped_faces(faces, "y")
+    most = float(np.finfo(np.float32).max) / max(float(faces.max()), 1.0)
+    if exposure > most:
+        raise SettingsError("exposure", f"{exposure:g} makes radiance infinite; expected at most {most:g}")
     return Environment(str(path), faces * np.float32(exposure))
 
 
@@ -107,7 +110,7 @@ def write_environment(path: FilePath, environment: Environment, *, force: bool =
     Raises
     ------
     OutputError
-        A file exists, cannot be written, or has another suffix.
+        A file exists, cannot be written, has another suffix, or more than one `*` in its name.
 
     Notes
     -----
@@ -155,6 +158,8 @@ def output_files(path: FilePath, force: bool = False) -> list[Path]:
         As `write_environment`.
     """
     place = Path(path)
+    if place.name.count("*") > 1:
+        raise OutputError(path, "has more than one *; expected one, for the name of the face")
     if "*" not in place.name and (place.is_dir() or not place.suffix):
         place = place / "*.exr"
     if place.suffix.lower() not in WRITTEN:

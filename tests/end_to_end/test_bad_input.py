@@ -131,6 +131,7 @@ def contents(folder):
         (RENDER + "--light 0,45,-1,0,0", 2, ["--light", "'0,45,-1,0,0'", "expected", "colour"]),
         (RENDER + "--light 45,135", 2, ["--light", "'45,135'", "expected", "-90 to 90"]),
         (RENDER + "--ambient -1", 2, ["--ambient", "-1", "expected"]),
+        (RENDER + "--environment a.hdr --exposure 0", 2, ["--exposure: 0; expected a number above 0"]),
         (RENDER + "--ambient dark", 2, ["--ambient", "'dark'", "expected a valid number"]),
         (RENDER + "--gloss 1", 2, ["--gloss", "'1'", "expected 2"]),
         (RENDER + "--gloss 1,0", 2, ["--gloss", "'1,0'", "expected"]),

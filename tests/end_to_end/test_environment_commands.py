@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from impostor.files.environment_file import read_environment
+from impostor.environment import Environment
+from impostor.files.environment_file import read_environment, write_environment
 from tests.data import DATA, SAMPLES, needs_data
 from tests.end_to_end.commands import json_of, ok, pixels, run
 
@@ -40,6 +41,12 @@ def test_info_says_where_the_light_comes_from(capsys):
     assert said["largest_luminance"] > 5000 and 10 < said["stops"] < 25
     assert 0 < said["harmonics_error_percent"] < 20
     assert len(said["lights"]) == 2
+
+
+def test_an_even_panorama_has_no_brightest_direction(capsys, tmp_path):
+    write_environment(tmp_path / "even.exr", Environment("even", np.full((6, 8, 8, 3), 0.7)))
+    said = json_of(capsys, "environment", "info", tmp_path / "even.exr", "--json")
+    assert said["brightest_direction"] is None and said["lights"] == []
 
 
 def test_info_for_people_has_a_line_for_each_light(capsys, small):
@@ -113,6 +120,8 @@ def test_outputs_are_not_replaced_unasked(capsys, small, tmp_path):
         (2, ("info", STUDY, "--lights", 0), "--lights: 0; expected 1 to 16"),
         (2, ("convert", STUDY, "a.hdr", "--size", 100), "--size: 100; expected a power of two"),
         (2, ("convert", STUDY, "a.hdr", "--exposure", -1), "--exposure: -1; expected a number above 0"),
+        (2, ("info", STUDY, "--exposure", 1e39), "--exposure: 1e+39 makes radiance infinite; expected at most"),
+        (1, ("convert", STUDY, "*_*.png"), "*_*.png: has more than one *; expected one"),
         (1, ("convert", STUDY, "a.jpg"), "a.jpg: ends in '.jpg'; expected a name that ends in .hdr, .exr, .png"),
     ],
 )

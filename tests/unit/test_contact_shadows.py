@@ -249,7 +249,8 @@ class TestCost:
         assert raw.snapshot() == before
 
 
-@pytest.mark.parametrize("wrong", [{"strength": -0.1}, {"strength": 1.1}, {"reach": 0.0}, {"reach": np.nan}])
+@pytest.mark.parametrize("wrong", [{"strength": -0.1}, {"strength": 1.1}, {"reach": 0.0}, {"reach": np.nan},
+                                   {"strength": "a"}, {"reach": None}])  # fmt: skip
 def test_settings_out_of_range_are_refused(wrong):
     with pytest.raises(SettingsError, match=f"contact shadows: {next(iter(wrong))}"):
         ContactShadows(**wrong)

@@ -189,6 +189,8 @@ def test_size_and_exposure(tmp_path):
         ({"size": 100}, "size: 100; expected a power of two from 8 to 4096"),
         ({"exposure": 0.0}, "exposure: 0; expected a number above 0"),
         ({"exposure": float("nan")}, "exposure: nan; expected"),
+        ({"exposure": 1e39}, "exposure: 1e+39 makes radiance infinite; expected at most 1.70141e+38"),
+        ({"exposure": 3e38}, "exposure: 3e+38 makes radiance infinite; expected at most 1.70141e+38"),
     ):
         with pytest.raises(SettingsError, match=re.escape(said)):
             read_environment(path, **options)
@@ -206,6 +208,7 @@ def test_what_is_no_map_is_said(tmp_path):
     assert "has none of the six faces" in refusal(photographs(tmp_path / "other", ["a", "b"]))
     assert "has none of the six faces" in refusal(tmp_path / "*.png")
     assert "does not exist" in refusal(tmp_path / "nowhere" / "*.png")
+    assert "has more than one *; expected one" in refusal(tmp_path / "*_*.png")
 
 
 @pytest.mark.parametrize("size", ["-Y 1000000 +X 2000000", "-Y 30000 +X 60000"])
@@ -339,6 +342,7 @@ def test_writing_replaces_nothing_unasked_and_leaves_nothing_behind(tmp_path):
     write_environment(tmp_path / "six", environment, force=True)
     assert (tmp_path / "six" / "posx.exr").read_bytes() == before
     for name, said in (("a.jpg", "ends in '.jpg'; expected a name that ends in .hdr, .exr, .png, or a folder"),
+                       ("a_*_*.exr", "has more than one"),
                        ("none/a.hdr", "does not exist"), ("none/six", "does not exist")):  # fmt: skip
         with pytest.raises(OutputError, match=said):
             write_environment(tmp_path / name, environment)

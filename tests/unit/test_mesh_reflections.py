@@ -324,8 +324,9 @@ class TestBumps:
             (np.zeros((4, 4, 4), np.uint8), 1, r"\(4, 4, 4\) uint8; expected \(H, W, 3\) uint8"),
             (np.zeros((4, 4, 3)), 1, "float64"), ([[0, 0, 0]], 1, "a list"),
             (np.zeros((4, 4, 3), np.uint8), np.nan, "bumpiness nan"),
+            (np.zeros((4, 4, 3), np.uint8), "a", "bumpiness is a str; expected a finite number"),
         ],
-        ids=["alpha", "float", "list", "nan"],
+        ids=["alpha", "float", "list", "nan", "text"],
     )  # fmt: skip
     def test_what_are_no_bumps_is_refused(self, picture, bumpiness, problem):
         with pytest.raises(SettingsError, match=problem):
@@ -338,3 +339,13 @@ class TestBumps:
     def test_what_is_no_reflection_is_refused(self, renderer):
         with pytest.raises(SettingsError, match="reflection: a float; expected a Reflection"):
             renderer.add_mesh(card(), reflection=0.5)
+
+    def test_what_becomes_no_reflection_is_refused(self, renderer, screen):
+        mesh = renderer.add_mesh(card())
+        mesh.reflection = 3
+        with pytest.raises(SettingsError, match="reflection: a int; expected a Reflection"):
+            renderer.draw_meshes(*filling())
+        instances = renderer.add(solid_fan(Sphere(), views=6, size=32))
+        with pytest.raises(SettingsError, match="reflection: a str; expected a Reflection"):
+            instances.reflection = "x"
+        assert instances.reflection is None

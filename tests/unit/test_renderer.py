@@ -172,7 +172,8 @@ def test_a_released_renderer_says_so(ctx, screen):
     renderer = ImpostorRenderer(ctx, cache_side=256)
     renderer.add(FAN)
     renderer.release()
-    for use in (*DRAWS.values(), lambda renderer: renderer.add(FAN), lambda renderer: renderer.add_mesh(MODEL)):
+    for use in (*DRAWS.values(), lambda renderer: renderer.add(FAN), lambda renderer: renderer.add_mesh(MODEL),
+                lambda renderer: renderer.memory):  # fmt: skip
         with pytest.raises(GpuError) as caught:
             use(renderer)
         assert problem(caught) == "ImpostorRenderer: has been released; expected one that is in use"

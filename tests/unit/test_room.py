@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from impostor.environment import Environment, Room
+from impostor.environment import Environment, Reflection, Room
 from impostor.environment.room import WALL
 from impostor.errors import SettingsError
 
@@ -160,18 +160,59 @@ def test_rooms_that_light_alike_have_equal_keys():
     ("changes", "message"),
     [
         ({"shape": "cone"}, "shape 'cone'; expected one of far, sphere, box"),
-        ({"world_from_room": np.diag([1, 1, np.nan, 1])}, "no finite affine"),
+        ({"world_from_room": np.diag([1, 1, np.nan, 1])}, "world_from_room with a number that is not finite"),
+        ({"world_from_room": 2 * np.eye(4)}, "not affine; expected"),
         ({"world_from_room": np.diag([1, 0, 1, 1])}, "no inverse"),
         ({"world_from_room": np.diag([1, 1, -1, 1])}, "mirrors"),
         ({"world_from_room": np.eye(4) + np.eye(4, k=1) * [0, 1, 0, 0]}, "not at right angles"),
         ({"exposure": -1}, "exposure -1; expected a number of at least 0"),
         ({"exposure": np.inf}, "exposure inf"),
+        ({"exposure": "2"}, "exposure is a str; expected a number of at least 0"),
+        ({"exposure": None}, "exposure is a NoneType; expected"),
         ({"captured_at": (0, 1.5, 0)}, "expected a point inside"),
-        ({"captured_at": (0, np.nan, 0)}, "expected a point inside"),
-        ({"outside": (1, 0)}, "expected three finite numbers"),
+        ({"captured_at": (0, np.nan, 0)}, "captured_at with a number that is not finite"),
+        ({"captured_at": "a"}, "captured_at is a str; expected numbers"),
+        ({"outside": (1, 0)}, r"outside of shape \(2,\); expected \(3,\)"),
+        ({"outside": "red"}, "outside is a str; expected numbers"),
         ({"outside": (1, -1, 0)}, "none negative"),
     ],
 )
 def test_a_room_that_cannot_be_is_refused(changes, message):
     with pytest.raises(SettingsError, match=message):
         replace(Room.box(EMPTY, (2, 2, 2)), **changes)
+
+
+@pytest.mark.parametrize(
+    ("made", "message"),
+    [
+        (
+            lambda: Room.far("study.exr"),
+            "environment: a str; expected an Environment, as impostor.load_environment gives",
+        ),
+        (lambda: Room.far(EMPTY, yaw="x"), "room: yaw is a str; expected a finite number"),
+        (lambda: Room.far(EMPTY, exposure="2"), "room: exposure is a str; expected a number of at least 0"),
+        (lambda: Room.box(EMPTY, (4, 3)), "room: size of shape (2,); expected (3,)"),
+        (lambda: Room.box(EMPTY, "abc"), "room: size is a str; expected numbers of shape (3,)"),
+        (lambda: Room.box(EMPTY, (4, 3, 4), position=(0, 1)), "room: position of shape (2,); expected (3,)"),
+        (lambda: Room.sphere(EMPTY, "x"), "room: radius is a str; expected a number above 0"),
+        (lambda: Room.sphere(EMPTY, 0), "room: radius 0; expected a number above 0"),
+    ],
+)
+def test_what_no_room_can_be_made_of_is_said(made, message):
+    with pytest.raises(SettingsError) as caught:
+        made()
+    assert str(caught.value) == message
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"least": "a"}, "reflection: least is a str; expected a number from 0 to 1"),
+        ({"exponent": 65}, "reflection: exponent 65; expected a number from 0 to 64"),
+        ({"roughness": np.nan}, "reflection: roughness nan; expected a number from 0 to 1"),
+    ],
+)
+def test_a_reflection_that_cannot_be_is_refused(changes, message):
+    with pytest.raises(SettingsError) as caught:
+        Reflection(**changes)
+    assert str(caught.value) == message

@@ -112,14 +112,17 @@ def test_light_is_linear_and_nothing_is_black(ctx):
 @pytest.mark.parametrize(
     ("options", "problem"),
     [
-        ({"near": 0.0}, "near 0 m"), ({"near": 2.0, "far": 1.0}, "near 2 m, far 1 m"), ({"size": 48}, "faces of"),
+        ({"near": 0.0}, "near 0 m"), ({"near": 2.0, "far": 1.0}, "near 2 m, far 1 m"),
+        ({"size": 48}, "size 48; expected"),
+        ({"size": "a"}, "size 'a'; expected a power of two from 8 to 4096"),
+        ({"size": 8.0}, "size 8.0"), ({"size": 0}, "size 0"),
         ({"environment_from_world": np.diag([1, 1, -1])}, "no rotation"), ({"position": (0, 0)}, "position of shape"),
     ],
-    ids=["near", "range", "size", "mirrored", "position"],
+    ids=["near", "range", "size", "text", "float", "none", "mirrored", "position"],
 )  # fmt: skip
-def test_what_cannot_be_captured_is_refused(ctx, screen, options, problem):
+def test_what_cannot_be_captured_is_refused_before_drawing(ctx, screen, options, problem):
     with pytest.raises(SettingsError, match=problem):
-        capture_environment(ctx, lambda *_: None, **{"position": (0, 0, 0), "size": 8, **options})
+        capture_environment(ctx, lambda *_: pytest.fail("drawn"), **{"position": (0, 0, 0), "size": 8, **options})
 
 
 def test_a_captured_environment_is_one(ctx, screen):

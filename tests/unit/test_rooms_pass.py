@@ -372,6 +372,8 @@ def test_rooms_may_change_in_place(dark, screen):
     rooms[0] = Room.far(smooth_environment(), yaw=2.0)
     dark.draw_rooms(*filling())
     assert apart(screen.color(), before).min() > 5
+    with pytest.raises(SettingsError, match="rooms: a Room; expected a list of Room"):
+        dark.draw_rooms(*filling(), rooms[0])
     rooms.append("sky")
     with pytest.raises(SettingsError, match="number 1 is a str"):
         dark.draw_rooms(*filling())

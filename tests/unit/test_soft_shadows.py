@@ -296,10 +296,14 @@ class TestRooms:
             pictures.append(ground([])[0])
         assert np.abs(pictures[0] - pictures[1]).max() > 0.05
 
-    @pytest.mark.parametrize("count", [-1, 1.5, "two"])
+    @pytest.mark.parametrize("count", [-1, 1.5, "two", True])
     def test_another_count_is_refused(self, renderer, count):
         with pytest.raises(SettingsError, match="shadow_lights"):
             renderer.shadow_lights = count
+
+    def test_a_count_may_be_numpys(self, renderer):
+        renderer.shadow_lights = np.int64(1)
+        assert renderer.shadow_lights == 1 and type(renderer.shadow_lights) is int
 
 
 def test_the_shadow_of_a_room_alone_shows_its_colour(renderer, ground):
