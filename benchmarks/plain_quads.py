@@ -6,7 +6,8 @@ import moderngl
 
 from benchmarks.scenes import BACKGROUND, Field
 from runtime.gpu import set_uniforms
-from runtime.impostors import ALPHA_CUTOFF, QUAD_DTYPE
+from runtime.impostors import ALPHA_CUTOFF
+from runtime.quad_records import QUAD_DTYPE
 from runtime.relight import CORNERS
 
 VERTEX = """
@@ -54,7 +55,7 @@ class PlainQuads:
         cache = impostors._cache
         assert cache is not None
         self._field, self._ctx = field, ctx
-        self._count = field.renderer.statistics["instances"]
+        self._count = impostors._whole.count
         self._records = ctx.buffer(impostors._whole.quads.buffer.read(self._count * QUAD_DTYPE.itemsize))
         self._corners = ctx.buffer(CORNERS)
         self._texture = ctx.texture(cache.color.size, 4, cache.color.read())
@@ -64,7 +65,7 @@ class PlainQuads:
         program = self._ctx.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT.replace("FETCH", fetch))
         clip_from_world, size = self._field.viewer.clip_from_world, self._texture.size
         set_uniforms(program, clip_from_world=clip_from_world, texture_size=size, alpha_cutoff=ALPHA_CUTOFF)
-        layout = "3f 3f 3f 12x 4f 16x 3f 16x/i"
+        layout = "3f 3f 3f 12x 4f 3f 16x/i"
         names = ("center", "right", "up", "rectangle", "place")
         return self._ctx.vertex_array(program, [(self._corners, "2f", "corner"), (self._records, layout, *names)])
 

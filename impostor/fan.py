@@ -109,23 +109,3 @@ class Fan:
             rectangles[:, low] = line.argmax(axis=1)
             rectangles[:, high] = np.where(line.any(axis=1), line.shape[1] - line[:, ::-1].argmax(axis=1), 0)
         return rectangles
-
-    @cached_property
-    def empty_corners(self) -> NDArray[np.int32]:
-        """(V, 4) int32: the right-angled triangles that the object leaves free in its covered rectangle.
-
-        Lengths of their equal sides in texels: at the left top, right top, left bottom, right bottom corner.
-        """
-        covered: NDArray[np.bool_] = self.color[..., 3] > 0
-        first, last = covered.argmax(axis=2), self.size - 1 - covered[:, :, ::-1].argmax(axis=2)
-        any_in_row = np.logical_or.reduce(covered, axis=2)
-        row = np.arange(self.size)
-        left, top, right, bottom = self.covered_rectangles.T
-        free = (
-            (first - left[:, None]) + (row - top[:, None]),
-            (right[:, None] - 1 - last) + (row - top[:, None]),
-            (first - left[:, None]) + (bottom[:, None] - 1 - row),
-            (right[:, None] - 1 - last) + (bottom[:, None] - 1 - row),
-        )
-        free = np.stack([np.where(any_in_row, each, 2 * self.size).min(axis=1) for each in free], axis=-1)
-        return np.where(np.logical_or.reduce(any_in_row, axis=1)[:, None], free, 0).astype(np.int32)

@@ -77,6 +77,24 @@ class FanTextures:
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         return texture
 
+    @cached_property
+    def rectangles(self) -> NDArray[np.float64]:
+        """What each view covers of its tile at each level, (levels x views, 4): left, bottom, right, top of -1 to 1."""
+        left, top, right, bottom = self.fan.covered_rectangles.T
+        edges = np.stack([left, self.size - bottom, right, self.size - top], axis=-1)
+        # One texel more on every side, for the filter.
+        borders = np.multiply.outer(1 << np.arange(self.levels), (-1, -1, 1, 1))
+        return np.clip(edges + borders[:, None], 0, self.size).reshape(-1, 4) * (2 / self.size) - 1
+
+    @cached_property
+    def depth_lines(self) -> NDArray[np.float64]:
+        """How far in front of each view's quad its surface lies, for a scale of 1, (V, 4): metres at depth 0, from
+        there to depth 1, and what one unit of the tile's x and y adds; the tile reaches from -1 to 1."""
+        views = self.fan.views
+        low, high = views.depth_range.T
+        offset, slope_right, slope_up = views.plane.T
+        return np.stack([low - offset, high - low, -slope_right * views.radius, -slope_up * views.radius], axis=-1)
+
     def tile_origins(self, views: NDArray[np.integer], levels: NDArray[np.integer]) -> NDArray[np.int64]:
         """First texel (N, 2) of each view's tile in the atlas at its mip level."""
         grid = np.stack([views % self.columns, views // self.columns], axis=-1)

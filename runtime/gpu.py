@@ -98,7 +98,7 @@ class InstanceBuffer:
     def __init__(self, ctx: moderngl.Context, dtype: np.dtype, count: int = 64):
         self.buffer = ctx.buffer(reserve=dtype.itemsize * count, dynamic=True)
 
-    def write(self, records: NDArray[np.void]) -> None:
+    def write(self, records: NDArray[Any]) -> None:
         """Upload the records; the buffer's old contents are given up, so the GPU need not wait."""
         self.buffer.orphan(max(records.nbytes, self.buffer.size))
         self.buffer.write(records)

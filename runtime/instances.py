@@ -226,7 +226,7 @@ class Viewer:
         w = np.einsum("i,ni->n", self.clip_from_world[3, :3], points) + self.clip_from_world[3, 3]
         return np.where(w > 1e-9, height / np.maximum(w, 1e-9), 0.0)
 
-    def nearness(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
+    def nearness(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """How much nearer (N,) points (N, 3) are than the camera's plane, in metres; negative for what it sees."""
         back, offset = self.view_from_world[2, :3], self.view_from_world[2, 3]
         return (np.einsum("i,ni->n", back, points) + offset).astype(np.float32)
@@ -250,9 +250,7 @@ class Quads:
     index : ndarray, (N,) intp
         Which of them.
     view : ndarray, (N,) intp
-        The nearest view of the fan.
-    toward_eye : ndarray, (N, 3) float64
-        Unit vectors.
+        Of the fan; mostly the nearest.
 
     Attributes
     ----------
@@ -268,7 +266,6 @@ class Quads:
     placement: Placement
     index: NDArray[np.intp]
     view: NDArray[np.intp]
-    toward_eye: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.index)
@@ -285,6 +282,11 @@ class Quads:
     def back(self) -> NDArray[np.float64]:
         """The last of the basis (N, 3)."""
         return self._turned("axis_back").T
+
+    @property
+    def middle(self) -> NDArray[np.float64]:
+        """World position (N, 3) of the middle of all the views' centres."""
+        return self.placement.middles.take(self.index, axis=1).T
 
     @cached_property
     def origin(self) -> NDArray[np.float64]:
@@ -317,12 +319,10 @@ class Quads:
 
     def take(self, which: NDArray[Any]) -> Quads:
         """Some of them, by index or mask."""
-        return Quads(self.placement, self.index[which], self.view[which], self.toward_eye[which])
+        return Quads(self.placement, self.index[which], self.view[which])
 
 
-def nearest_views(
-    instances: Instances, eye: NDArray[np.float64], index: NDArray[np.intp]
-) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+def nearest_views(instances: Instances, eye: NDArray[np.float64], index: NDArray[np.intp]) -> NDArray[np.intp]:
     """The fan view nearest to an eye, or to a light, of each instance.
 
     Parameters
@@ -335,21 +335,17 @@ def nearest_views(
 
     Returns
     -------
-    view : ndarray, (N,) intp
-    toward : ndarray, (N, 3) float64
-        Unit vectors from the instance toward the eye, world space.
+    ndarray, (N,) intp
     """
     return _nearest(instances.placement, eye, index)
 
 
-def _nearest(
-    placement: Placement, eye: NDArray[np.float64], index: NDArray[np.intp]
-) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+def _nearest(placement: Placement, eye: NDArray[np.float64], index: NDArray[np.intp]) -> NDArray[np.intp]:
+    # Not of unit length: no layout asks for that.
     toward = eye[:3, None] - eye[3] * placement.middles.take(index, axis=1)
-    toward /= np.maximum(np.sqrt(np.square(toward).sum(axis=0)), 1e-12)
     level = toward[2] + 1j * toward[0]
     level *= placement.turns.take(index).conj()
-    return placement.view_vectors.nearest(level.imag, toward[1], level.real), toward.T
+    return placement.view_vectors.nearest(level.imag, toward[1], level.real)
 
 
 def quads_toward(instances: Instances, eye: NDArray[np.float64], viewer: Viewer | None = None) -> Quads:
@@ -376,4 +372,4 @@ def quads_toward(instances: Instances, eye: NDArray[np.float64], viewer: Viewer 
     if viewer is not None:
         shown &= viewer.sees(placement.middles.T, placement.radii)
     index = np.flatnonzero(shown)
-    return Quads(placement, index, *_nearest(placement, eye, index))
+    return Quads(placement, index, _nearest(placement, eye, index))

@@ -6,10 +6,10 @@ import moderngl
 
 from impostor.fan import Fan
 from impostor.model import Model
+from runtime.batch import Batch
 from runtime.bump import Bump
 from runtime.fan_textures import FanTextures
 from runtime.gl_state import preserved_state
-from runtime.impostors import Batch
 from runtime.instances import Instances
 from runtime.lod import LevelOfDetail, Levels
 from runtime.meshes import MeshBuffers, MeshInstance

@@ -19,7 +19,7 @@ from runtime.fan_textures import FanTextures
 from runtime.instances import Quads
 from runtime.lights import LightTable
 from runtime.relight import PLACE_DTYPE, ROW_DTYPE, TILE_DTYPE, ColormapPass, RelightPass, Surroundings
-from runtime.tiles import TileCache, TileIndex
+from runtime.tiles import GUTTER, TileCache, TileIndex
 
 # While lights change from frame to frame, so many texels are relit in each; what is left of them follows.
 TEXELS_A_FRAME = 1 << 17
@@ -187,12 +187,11 @@ def _tile_records(
     work["place"][:, :3], work["place"][:, 3] = tiles.index.places[tiles.entries[chosen]], levels
     work["origin"][:, :2], work["origin"][:, 2] = fan.tile_origins(views, levels), rows
     # A new tile is drawn whole, because another may lie beneath.
-    work["part"][:, 2:] = work["place"][:, 2:3]
+    work["part"][:, :2], work["part"][:, 2:] = -GUTTER, work["place"][:, 2:3] + GUTTER
     if not new:
         covered = fan.fan.covered_rectangles[views]
-        work["part"][:, :2] = np.maximum((covered[:, :2] >> levels[:, None]) - 1, 0)
-        reach = (covered[:, 2:] - 1 >> levels[:, None]) + 2
-        work["part"][:, 2:] = np.minimum(reach, work["part"][:, 2:])
+        work["part"][:, :2] = (covered[:, :2] >> levels[:, None]) - 1
+        work["part"][:, 2:] = (covered[:, 2:] - 1 >> levels[:, None]) + 2
     return work
 
 

@@ -249,7 +249,7 @@ class ImpostorRenderer(LightSettings):
             near = [copies for each in levels for copies in each.copies()]
             self._mesh_pass.draw_copies(state, near, viewer, self._table, self._room_table, output)
             self._statistics = self._mesh_pass.statistics
-            self._impostors.draw(state, self._placed.batches, viewer, self._table, self._room_table, output)
+            self._impostors.draw(state, self._placed.batches, viewer, self._table, self._room_table, output, seconds)
 
     def draw_meshes(self, clip_from_view: ArrayLike, view_from_world: ArrayLike, output: str = "lit") -> None:
         """Draw the meshes that `add_mesh` placed; parameters as `draw`."""

@@ -204,7 +204,7 @@ def _strip_keys(
 ) -> NDArray[np.intp]:
     """Which strips some copies cast toward a light: the nearest view in the upper bits, its level below."""
     toward = toward / np.linalg.norm(toward)
-    views, _ = nearest_views(fan.instances, np.append(toward, 0.0), fan.seen.index[chosen])
+    views = nearest_views(fan.instances, np.append(toward, 0.0), fan.seen.index[chosen])
     return views << 8 | fan.levels(1 / float(ground.normal @ toward), largest)[chosen]
 
 

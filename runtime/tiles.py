@@ -6,13 +6,14 @@ from collections.abc import Sequence
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from impostor.environment.room import Room
 from runtime.gpu import check_texture_size
 
 # Copies in one cube of this part of the smallest room's smallest side share tiles: they are at most 1.4 % of it apart.
 CELL = 1 / 128
+GUTTER = 1  # texels around each tile
 VIEW_BITS, LEVEL_BITS = 11, 4
 
 
@@ -23,76 +24,88 @@ class CacheFull(Exception):
 class TileCache:
     """One pair of textures that holds relit tiles of many sizes.
 
-    The texture is divided into pages; a page holds tiles of one size. Places are handed out and never taken back one
-    by one: when nothing is left, the cache is emptied and this frame's tiles are relit.
+    The texture is divided into shelves; a shelf holds tiles of one size. Around each tile its edge is there once more,
+    so that a filter needs no clamping. Places are handed out and never taken back one by one: when nothing is left, the
+    cache is emptied and this frame's tiles are relit.
 
     Parameters
     ----------
     ctx : moderngl.Context
     side : int
-        Texels on each side of the cache; it takes 6 bytes a texel.
-    page : int
-        Side of the largest tile; a power of two that divides `side`.
+        A power of two, at least `side_for` the largest tile: in a square of so many texels tiles would fit without
+        their gutters.
 
     Attributes
     ----------
+    side : int
+        Texels on each side of the textures; they take 6 bytes a texel.
     color : moderngl.Texture
         sRGB-encoded, premultiplied.
     depth : moderngl.Texture
         16-bit normalised.
     """
 
-    def __init__(self, ctx: moderngl.Context, side: int, page: int):
-        check_texture_size(ctx, "tile cache", side, side)
-        self.side, self.page = side, page
-        self.color = ctx.texture((side, side), 4)
+    def __init__(self, ctx: moderngl.Context, side: int):
+        self.capacity, self.side = side, side + side // 64
+        check_texture_size(ctx, "tile cache", self.side, self.side)
+        self.color = ctx.texture((self.side, self.side), 4)
         self.color.filter = (moderngl.LINEAR, moderngl.LINEAR)
-        self.depth = ctx.texture((side, side), 1, dtype="nu2", alignment=2)
+        self.depth = ctx.texture((self.side, self.side), 1, dtype="nu2", alignment=2)
         self.depth.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self.target = ctx.framebuffer([self.color, self.depth])
         self.color_target = ctx.framebuffer([self.color])
         self.clear()
 
+    @staticmethod
+    def side_for(size: int) -> int:
+        """The least `side` of a cache that holds tiles of some size."""
+        return max(1 << (size + 2 * GUTTER - 1).bit_length(), 256)
+
     def clear(self) -> None:
         """Give every place back."""
-        self._pages_used = 0
+        self._top = 0
         self._open: dict[int, tuple[int, int]] = {}
 
-    def place(self, sizes: list[int]) -> NDArray[np.int32]:
+    def place(self, sizes: ArrayLike) -> NDArray[np.int32]:
         """Make room for tiles; which tile is where is for a `TileIndex` to know.
 
         Parameters
         ----------
-        sizes : list of int
+        sizes : array_like, (N,) int
             Side of each tile in texels.
 
         Returns
         -------
         ndarray, (N, 3) int32
-            x, y and side in the cache.
+            x, y and side in the cache, gutters left out.
 
         Raises
         ------
         CacheFull
             They do not all fit; tiles placed before stay where they are.
         """
-        return np.array([self._place(size) for size in sizes], np.int32).reshape(-1, 3)
+        sizes = np.asarray(sizes, np.int64)
+        places = np.empty((len(sizes), 3), np.int32)
+        for size in np.unique(sizes).tolist():
+            chosen = np.flatnonzero(sizes == size)
+            places[chosen, :2], places[chosen, 2] = self._place(size, len(chosen)), size
+        return places
 
-    def _place(self, size: int) -> tuple[int, int, int]:
-        cell = 1 << max(size - 1, 0).bit_length()
-        page, used = self._open.get(cell, (-1, 0))
-        per_row = self.page // cell
-        if page < 0 or used == per_row * per_row:
-            pages_per_row = self.side // self.page
-            if self._pages_used == pages_per_row**2:
-                raise CacheFull
-            page, used = self._pages_used, 0
-            self._pages_used += 1
-        self._open[cell] = (page, used + 1)
-        pages_per_row = self.side // self.page
-        x = page % pages_per_row * self.page + used % per_row * cell
-        y = page // pages_per_row * self.page + used // per_row * cell
-        return x, y, size
+    def _place(self, size: int, count: int) -> NDArray[np.int64]:
+        """Where (N, 2) so many tiles of one size go."""
+        cell = size + 2 * GUTTER
+        a_shelf, (shelf, used) = self.side // cell, self._open.get(size, (0, 0))
+        left = min(-used % a_shelf, count)
+        shelves = -(-(count - left) // a_shelf)
+        if self._top + shelves * cell > self.side:
+            raise CacheFull
+        old = np.stack([used + np.arange(left), np.full(left, shelf)], axis=-1)
+        row, column = np.divmod(np.arange(count - left), a_shelf)
+        new = np.stack([column, self._top + row * cell], axis=-1)
+        found = np.concatenate([old, new])
+        self._top += shelves * cell
+        self._open[size] = int(found[-1, 1]), int(found[-1, 0]) + 1
+        return found * (cell, 1) + GUTTER
 
     def release(self) -> None:
         """Free the textures."""
@@ -140,36 +153,6 @@ class TileIndex:
         self._entries = np.insert(self._entries, at, entries[order])
         self.places = np.concatenate([self.places, places])
         self.versions = np.concatenate([self.versions, np.full(len(keys), -1)])
-
-
-class LastTiles:
-    """The tiles that copies of a fan showed last: from frame to frame few copies show another one.
-
-    Parameters
-    ----------
-    index : TileIndex
-    count : int
-        Of copies.
-    """
-
-    def __init__(self, index: TileIndex, count: int):
-        self.index = index
-        self._keys, self._entries = np.full(count, -1, np.int64), np.zeros(count, np.intp)
-
-    def __len__(self) -> int:
-        return len(self._keys)
-
-    def changed(self, copies: NDArray[np.intp], keys: NDArray[np.int64]) -> NDArray[np.intp]:
-        """Which of some copies, given by the keys (N,) of their tiles, do not show the tile that they showed last."""
-        return np.flatnonzero(self._keys.take(copies) != keys)
-
-    def remember(self, copies: NDArray[np.intp], keys: NDArray[np.int64], entries: NDArray[np.intp]) -> None:
-        """Take over the tiles of copies that show others than before."""
-        self._keys[copies], self._entries[copies] = keys, entries
-
-    def entries(self, copies: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Where the tiles of copies stand in the index."""
-        return self._entries.take(copies)
 
 
 class CellIndex:

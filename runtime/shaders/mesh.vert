@@ -14,7 +14,7 @@ out vec3 v_tangent;
 flat out float v_mirrored;
 out vec2 v_uv;
 out vec4 v_tint;
-flat out float v_fan_share;
+flat out vec2 v_fan_part;
 
 void main() {
     vec4 point = vec4(position, 1.0);
@@ -25,5 +25,5 @@ void main() {
     v_mirrored = tangent.w;
     v_uv = uv;
     v_tint = vec4(mix(tint.rgb / 12.92, pow((tint.rgb + 0.055) / 1.055, vec3(2.4)), step(0.04045, tint.rgb)), tint.a);
-    v_fan_share = fan_share;
+    v_fan_part = vec2(0.0, fan_share);
 }

@@ -5,7 +5,7 @@
 uniform sampler2D fan_color;  // linear when fetched, premultiplied
 
 void main() {
-    ivec2 texel = ivec2(gl_FragCoord.xy) + v_shift;
+    ivec2 texel = texel_here();
     float code = texelFetch(fan_normal, texel, v_level).r;
     vec4 albedo = texelFetch(fan_color, texel, v_level);
     vec3 lit = albedo.rgb / max(albedo.a, 1e-4) * colormap_entry(code, 0).rgb + colormap_entry(code, 1).rgb;

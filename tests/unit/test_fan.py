@@ -40,20 +40,6 @@ def test_covered_rectangles_hold_what_is_covered_and_no_more():
     assert left >= right or top >= bottom
 
 
-def test_empty_corners_are_the_largest_triangles_that_hold_nothing():
-    random = np.random.default_rng(3)
-    for share in (0.02, 0.1, 0.5):
-        pixels = np.zeros((16, 16, 4), np.uint8)
-        pixels[..., 3] = random.random((16, 16)) < share
-        fan = card_fan(pixels)
-        left, top, right, bottom = fan.covered_rectangles[0]
-        row, column = np.nonzero(pixels[..., 3])
-        across, down = (column - left, right - 1 - column), (row - top, bottom - 1 - row)
-        expected = [(x + y).min() for y in down for x in across]
-        assert fan.empty_corners[0].tolist() == expected
-    assert card_fan(np.zeros((8, 8, 4))).empty_corners.tolist() == [[0, 0, 0, 0]]
-
-
 @pytest.mark.parametrize(
     ("layer", "wrong", "message"),
     [

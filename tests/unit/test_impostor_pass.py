@@ -10,6 +10,7 @@ from scipy.ndimage import binary_erosion
 from impostor.lighting import DirectionalLight, Gloss
 from impostor.views import direction
 from runtime import ImpostorRenderer, LevelOfDetail
+from runtime.fan_textures import FanTextures
 from runtime.impostors import _ascending
 from runtime.offscreen import Offscreen
 from tests.pictures import apart, bluish, cropped, filling, iou, looking, placed
@@ -229,7 +230,7 @@ class TestManyCopies:
         rendered = moderngl.VertexArray.render
 
         def spied(array, *arguments, **options):
-            if array in (renderer._impostors._whole.rectangles, renderer._impostors._whole.octagons):
+            if array is renderer._impostors._whole.array:
                 calls.append(options["instances"])
             return rendered(array, *arguments, **options)
 
@@ -240,21 +241,17 @@ class TestManyCopies:
         assert calls == [800]
         assert renderer.statistics["instances"] == 800
 
-    def test_a_cut_corner_takes_nothing_off_the_picture(self, renderer, draw, monkeypatch):
-        """Large enough on the screen for an octagon; a ball leaves a lot of every corner free."""
+    def test_a_covered_rectangle_takes_nothing_off_the_picture(self, renderer, draw, monkeypatch):
         fan, matrices = (
             solid_fan(Sphere(color=RED), Box((-1, -1, 0), (0, 0, 0.1), GREEN), views=4, size=64),
             filling(1.2),
         )
-        monkeypatch.setattr("runtime.impostors.SPARED_TEXELS", 10)
         ball = renderer.add(fan)
         cut = draw(matrices)
-        assert renderer._impostors._whole.shape is renderer._impostors._whole.octagons
-        monkeypatch.setattr("runtime.impostors.SPARED_TEXELS", 1e9)
         renderer.remove(ball)
+        monkeypatch.setattr(FanTextures, "rectangles", np.tile((-1, -1, 1, 1), (len(fan.views) * len(fan.normal), 1)))
         renderer.add(fan)
         np.testing.assert_array_equal(draw(matrices), cut)
-        assert renderer._impostors._whole.shape is renderer._impostors._whole.rectangles
 
     @pytest.mark.parametrize("matrices", [filling(3.0, 0.2), looking((1, 1, 9))])
     def test_the_order_of_the_arrays_does_not_show(self, renderer, draw, matrices):
@@ -433,7 +430,7 @@ class TestSizes:
 
 
 class TestFullCache:
-    """A cache of one page: 16 tiles of 64 texels, 64 of 32."""
+    """A cache of 9 tiles of 64 texels, 49 of 32, 196 of 16."""
 
     POSITIONS = np.stack(np.meshgrid(*[np.arange(-3.5, 4)] * 2), axis=-1).reshape(-1, 2)
     POSITIONS = np.insert(POSITIONS * 2.4, 2, 0, axis=1)
@@ -455,9 +452,9 @@ class TestFullCache:
             picture.release()
 
     def test_coarser_tiles_when_there_are_more_than_fit(self, ctx):
-        enough, plenty = (self.pictures(ctx, PAINTED, 64, filling(10.0), side) for side in (256, 2048))
+        enough, plenty = (self.pictures(ctx, PAINTED, 49, filling(10.0), side) for side in (256, 2048))
         assert plenty[1]["coarser"] == 0 < enough[1]["coarser"]
-        assert enough[1]["instances"] == enough[1]["tiles"] == enough[1]["relit"] == 64
+        assert enough[1]["instances"] == enough[1]["tiles"] == enough[1]["relit"] == 49
         assert enough[2] == {**enough[1], "relit": 0}
         assert apart(*(pictures[0] for pictures in (enough, plenty))).mean() < 12
         assert iou(enough[0][..., 3] > 128, plenty[0][..., 3] > 128) > 0.9
@@ -472,7 +469,7 @@ class TestFullCache:
         assert (apart(enough[0], plenty[0]) > 2).sum() <= 2
 
     def test_the_cache_is_emptied_when_yaws_go_on_turning(self, ctx, renderer, draw):
-        """Every frame needs a new tile; 400 of them do not fit in one page of 16."""
+        """Every frame needs a new tile; 40 of them do not fit where 9 do."""
         small = ImpostorRenderer(ctx, cache_side=256)
         try:
             copies = small.add(FAN)

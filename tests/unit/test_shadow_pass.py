@@ -90,7 +90,7 @@ def expected_mask(fan, place, matrices, light, plane):
     instances = Instances(fan, *place)
     eye = Viewer.from_matrices(*matrices, (0, 0, SIZE, SIZE)).eye
     quad = quads_toward(instances, eye)
-    light_view = int(nearest_views(instances, np.append(light.toward, 0), np.array([0]))[0][0])
+    light_view = int(nearest_views(instances, np.append(light.toward, 0), np.array([0]))[0])
     strips = silhouette_strips(fan.silhouette[light_view])
     shadow = shadow_on_ground(
         strips,

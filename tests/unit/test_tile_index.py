@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from runtime.tiles import LastTiles, TileIndex
+from runtime.tiles import TileIndex
 
 
 def test_tiles_are_found_in_whatever_order_they_came():
@@ -29,12 +29,3 @@ def test_an_entry_stays_where_it_is_and_has_no_picture_at_first():
     index.versions[entries] = 7, 9
     index.add(np.array([4]), np.ones((1, 3), np.int32))
     assert index.versions[index.find(np.array([3, 4, 5]))].tolist() == [7, -1, 9]
-
-
-def test_only_copies_that_show_another_tile_than_last_are_looked_up():
-    last = LastTiles(TileIndex(), count=5)
-    copies = np.array([0, 2, 3])
-    assert last.changed(copies, np.array([7, 7, 9])).tolist() == [0, 1, 2]
-    last.remember(copies, np.array([7, 7, 9]), np.array([4, 4, 1]))
-    assert last.entries(np.array([3, 0])).tolist() == [1, 4]
-    assert last.changed(np.array([0, 1, 2, 3]), np.array([7, 7, 8, 9])).tolist() == [1, 2]

@@ -5,37 +5,49 @@ import pytest
 
 from impostor.errors import GpuError
 from runtime.gpu import tiles_to_atlas
-from runtime.tiles import CacheFull, TileCache
+from runtime.tiles import GUTTER, CacheFull, TileCache
 
 
 @pytest.fixture
 def cache(ctx):
-    cache = TileCache(ctx, side=256, page=64)
+    cache = TileCache(ctx, side=256)
     yield cache
     cache.release()
 
 
-def squares(places):
-    return [{(x + i, y + j) for i in range(side) for j in range(side)} for x, y, side in places.tolist()]
+def squares(places, gutter):
+    return [
+        {(x + i, y + j) for i in range(-gutter, side + gutter) for j in range(-gutter, side + gutter)}
+        for x, y, side in places.tolist()
+    ]
 
 
-def test_places_never_overlap_and_stay_inside(cache):
+def test_places_with_their_gutters_never_overlap_and_stay_inside(cache):
     sizes = [64, 16, 16, 40, 33, 8, 1, 4, 64, 16, 5]
     places = np.concatenate([cache.place(sizes[:4]), cache.place(sizes[4:])])
     assert places[:, 2].tolist() == sizes
-    covered = squares(places)
+    covered = squares(places, GUTTER)
     assert len(set().union(*covered)) == sum(map(len, covered))
-    assert places[:, :2].min() >= 0
-    assert (places[:, :2] + places[:, 2:]).max() <= 256
+    assert places[:, :2].min() >= GUTTER
+    assert (places[:, :2] + places[:, 2:]).max() <= cache.side - GUTTER
 
 
-def test_the_cache_holds_as_many_tiles_as_fit_and_no_more(cache):
-    places = cache.place([16] * 256)
-    assert len({(x, y) for x, y, _ in places.tolist()}) == 256
+@pytest.mark.parametrize(("size", "count"), [(128, 4), (64, 9), (16, 14 * 14)])
+def test_the_cache_holds_as_many_tiles_as_fit_and_no_more(cache, size, count):
+    places = cache.place([size] * count)
+    assert len({(x, y) for x, y, _ in places.tolist()}) == count
     with pytest.raises(CacheFull):
-        cache.place([16])
+        cache.place([size])
     cache.clear()
-    np.testing.assert_array_equal(cache.place([16] * 256), places)
+    one_by_one = np.concatenate([cache.place([size]) for _ in range(count)])
+    np.testing.assert_array_equal(one_by_one, places)
+
+
+@pytest.mark.parametrize("size", [1, 63, 64, 100, 256, 1024])
+def test_the_least_cache_for_a_size_holds_one(ctx, size):
+    cache = TileCache(ctx, TileCache.side_for(size))
+    cache.place([size])
+    cache.release()
 
 
 def test_no_tiles_need_no_place(cache):
@@ -43,8 +55,8 @@ def test_no_tiles_need_no_place(cache):
 
 
 def test_a_cache_that_the_gpu_cannot_hold_is_refused(ctx):
-    with pytest.raises(GpuError, match=r"^tile cache: needs a texture of 1048576x1048576"):
-        TileCache(ctx, side=1 << 20, page=256)
+    with pytest.raises(GpuError, match=r"^tile cache: needs a texture of 1064960x1064960"):
+        TileCache(ctx, side=1 << 20)
 
 
 @pytest.mark.parametrize("count", [1, 2, 5, 12, 96])

@@ -2,10 +2,15 @@
 uniform sampler2D fan_normal;  // r: normal code / 255, g: coverage
 uniform sampler2D fan_depth;
 uniform sampler2D colormap;
-flat in ivec2 v_shift;
+flat in ivec2 v_shift, v_first, v_last;
 flat in int v_level, v_row;
 layout(location = 0) out vec4 relit;
 layout(location = 1) out float depth;
+
+// Of the fan; around the tile its edge goes on.
+ivec2 texel_here() {
+    return clamp(ivec2(gl_FragCoord.xy) + v_shift, v_first, v_last);
+}
 
 vec4 colormap_entry(float code, int table) {
     return texelFetch(colormap, ivec2(int(code * 255.0 + 0.5) + 256 * table, v_row), 0);

@@ -3,19 +3,14 @@ uniform sampler2D tiles;
 uniform sampler2D tile_depth;
 uniform float alpha_cutoff;
 in vec2 v_uv;
-flat in vec2 v_toward_eye;
-flat in vec4 v_bounds;
-in float v_depth_start;
-flat in float v_depth_span;
+in vec2 v_clip;       // (z + w) / 2 and w in clip space, of a surface at depth 0
+flat in vec2 v_step;  // what depth 1 adds to that
 out vec4 color;
 
 void show_tile() {
-    vec2 uv = clamp(v_uv, v_bounds.xy, v_bounds.zw);
-    color = textureLod(tiles, uv, 0.0);
-    if (color.a < alpha_cutoff) discard;
-    // gl_FragCoord holds z / w and 1 / w of the quad; the surface lies this far from it, toward the eye.
-    float offset = (v_depth_start + textureLod(tile_depth, uv, 0.0).r * v_depth_span) * gl_FragCoord.w;
-    // What reaches past the eye, where w is not positive, is in front of everything.
-    float w = max(1.0 + offset * v_toward_eye.y, 1e-6);
-    gl_FragDepth = clamp((gl_FragCoord.z + offset * v_toward_eye.x) / w, 0.0, 1.0);
+    color = textureLod(tiles, v_uv, 0.0);
+    vec2 clip = v_clip + textureLod(tile_depth, v_uv, 0.0).r * v_step;
+    // What reaches past the eye, where w is not positive, is in front of everything. Nothing is in front of depth 1:
+    // for a rasteriser that is less work than to discard.
+    gl_FragDepth = color.a < alpha_cutoff ? 1.0 : clamp(clip.x / max(clip.y, 1e-6), 0.0, 1.0);
 }

@@ -1,0 +1,101 @@
+"""A batch: copies of one fan in one renderer, and which of its pictures each shows in a frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from runtime.fan_textures import FanTextures
+from runtime.instances import Instances, Quads, Viewer, quads_toward
+from runtime.lod import Levels
+from runtime.quad_records import QuadRecords
+from runtime.tiles import TileIndex
+from runtime.view_fades import ViewFades
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """The quads of a batch in a frame.
+
+    Parameters
+    ----------
+    quads : Quads
+        Copies that fade from one view to the next are there twice.
+    slots : ndarray, (N,) intp
+        Of each quad in `QuadRecords`.
+    parts : ndarray, (N, 2) float32
+        Of the dither, from and to: which pixels each quad keeps. (0, 1) is a whole one.
+    """
+
+    quads: Quads
+    slots: NDArray[np.intp]
+    parts: NDArray[np.float32]
+
+    def __len__(self) -> int:
+        return len(self.quads)
+
+
+@dataclass
+class Batch:
+    """Instances that share a fan, the fan's textures, and the instances' levels where they have a mesh, too."""
+
+    instances: Instances
+    textures: FanTextures
+    levels: Levels | None = None
+    fades: ViewFades = field(init=False)
+    _records: QuadRecords | None = field(default=None, init=False)
+
+    def __post_init__(self):
+        self.fades = ViewFades(len(self.instances))
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """Equal while the instances look the same to the same viewer."""
+        # What fades is another picture in every frame.
+        fade = object() if self.fades.fading else None
+        return id(self.textures), *self.instances.key, self.levels and self.levels.key, fade
+
+    def seen_by(self, viewer: Viewer) -> Quads:
+        """The nearest view of each instance that shows some of its fan in the picture."""
+        quads = quads_toward(self.instances, viewer.eye, viewer)
+        shares = self._shares_of(quads)
+        return quads if shares.all() else quads.take(shares != 0)
+
+    def shown_to(self, viewer: Viewer, seconds: float | None, fade_seconds: float) -> Shown:
+        """What a viewer is shown, so many seconds after the last frame; None is a look from elsewhere in between."""
+        quads = self.seen_by(viewer)
+        shares, slots = self._shares_of(quads), quads.index
+        if seconds is not None:
+            self.fades.update(quads.index, quads.view, seconds, fade_seconds)
+        # Shares below 0 take their pixels from the other end.
+        parts = np.empty((len(quads), 2), np.float32)
+        parts[:, 0], parts[:, 1] = (1 + shares) * (shares < 0), np.where(shares < 0, 1, shares)
+        if seconds is None or not self.fades.fading:
+            return Shown(quads, slots, parts)
+        part = self.fades.share.take(slots)
+        fading = np.flatnonzero(part < 1)
+        between = parts[fading, 0] + part[fading] * (parts[fading, 1] - parts[fading, 0])
+        leaving = parts[fading]
+        leaving[:, 0] = parts[fading, 1] = between
+        copies = slots[fading]
+        view = np.concatenate([self.fades.shown.take(slots), self.fades.leaving.take(copies)])
+        quads = Quads(quads.placement, np.concatenate([slots, copies]), view)
+        return Shown(quads, np.concatenate([slots, copies + len(self.instances)]), np.concatenate([parts, leaving]))
+
+    def _shares_of(self, quads: Quads) -> NDArray[np.float32]:
+        """The part (N,) of each one's pixels that shows the fan; below 0, from the other end of the dither."""
+        shares = self.instances.shares.take(quads.index)
+        return shares if self.levels is None else shares * self.levels.fan_share.take(quads.index)
+
+    def records_with(self, index: TileIndex) -> QuadRecords:
+        """The quads that the copies showed last, with tiles of an index."""
+        if self._records is None or self._records.index is not index:
+            self._records = QuadRecords(index, self.textures, len(self.instances))
+        return self._records
+
+    def rows(self, shown: Shown) -> NDArray[np.float32]:
+        """QUAD_DTYPE records of what is shown, as plain numbers: NumPy moves records field by field."""
+        assert self._records is not None, "the tiles come first"
+        return self._records.rows(shown.slots)
