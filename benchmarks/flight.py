@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from unittest.mock import patch
 
@@ -19,8 +20,10 @@ from benchmarks.workbench import Workbench, say
 from impostor.scene import Placement, Scene
 from runtime import impostors, relighting, shadow_strips
 from runtime.baking import Bakery, unbaked
+from runtime.batch import Batch
 from runtime.instances import Instances, Quads, Viewer, nearest_views
 from runtime.lod import LevelOfDetail, Levels
+from runtime.view_fades import VIEW_FADE_SECONDS, ViewFades
 from runtime.walk import Walk
 from runtime.walk_cli import ready_scene
 
@@ -49,11 +52,14 @@ class Seen:
         Of the first light.
     shares : list of ndarray
         The fan's share of each copy of each fan that has a mesh.
+    fades : list of ViewFades
+        Of each fan.
     """
 
     viewer: Viewer
     toward_light: tuple[float, float, float]
     shares: list[NDArray[np.float32]]
+    fades: list[ViewFades]
 
 
 @dataclass(frozen=True)
@@ -87,18 +93,30 @@ class Flight:
     scene : Scene
     levels : LevelOfDetail, optional
         Of what the scene draws as a mesh where it is near.
+    view_fade_seconds : float
     """
 
-    def __init__(self, ctx: moderngl.Context, scene: Scene, levels: LevelOfDetail | None = None):
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        scene: Scene,
+        levels: LevelOfDetail | None = None,
+        view_fade_seconds: float = VIEW_FADE_SECONDS,
+    ):
         self.walk = Walk(ctx, scene, SIZE)
         self.renderer = self.walk.stage.renderer
+        self.renderer._impostors.view_fade_seconds = view_fade_seconds
         for each in self._levels:
             each.settings = levels or LevelOfDetail()
         self.walk.follow_path()
 
     @property
     def _levels(self) -> list[Levels]:
-        return [batch.levels for batch in self.renderer._placed.batches if batch.levels is not None]
+        return [batch.levels for batch in self._batches if batch.levels is not None]
+
+    @property
+    def _batches(self) -> list[Batch]:
+        return self.renderer._placed.batches
 
     def picture(self) -> Picture:
         """Draw a frame from scratch, although nothing may have moved."""
@@ -109,17 +127,22 @@ class Flight:
     def seen(self) -> Seen:
         """Of the frame that was drawn last."""
         viewer = Viewer.from_matrices(*self.walk.camera.matrices, (0, 0, *SIZE))
-        return Seen(viewer, self.walk.sun.lighting.lights[0].toward, [each.fan_share.copy() for each in self._levels])
+        shares, fades = [each.fan_share.copy() for each in self._levels], [batch.fades for batch in self._batches]
+        return Seen(viewer, self.walk.sun.lighting.lights[0].toward, shares, deepcopy(fades))
 
     def held(self, before: Seen, kinds: Sequence[str] = KINDS) -> Picture:
         """The frame that was drawn last with some kinds of switches undone; what was lit stays as it is lit."""
-        shares = [each.fan_share for each in self._levels]
+        shares, fades = [each.fan_share for each in self._levels], [batch.fades for batch in self._batches]
         with switches_held(before, self.seen(), kinds):
             for each, share in zip(self._levels, before.shares, strict=True):
                 each.fan_share = share if "levels" in kinds else each.fan_share
+            for batch, fade in zip(self._batches, before.fades, strict=True):
+                batch.fades = deepcopy(fade if "views" in kinds else batch.fades)
             picture = self.picture()
         for each, share in zip(self._levels, shares, strict=True):
             each.fan_share = share
+        for batch, fade in zip(self._batches, fades, strict=True):
+            batch.fades = fade
         return picture
 
     def skip(self, seconds: float) -> None:
@@ -147,7 +170,7 @@ class Flight:
         """How many copies have switched, and where (N, 4) those stand whose views did: left, top, right, bottom."""
         found: dict[str, int] = dict.fromkeys(KINDS, 0)
         rectangles = []
-        for batch in self.renderer._placed.batches:
+        for batch in self._batches:
             instances = batch.instances
             now = batch.seen_by(seen.viewer)
             then = _with_view(instances, now, before.viewer.eye)
@@ -156,7 +179,7 @@ class Flight:
             levels = (impostors._levels(batch, *each) for each in ((then, before.viewer), (now, seen.viewer)))
             found["tiles"] += int(np.count_nonzero(np.not_equal(*levels)))
             lit = (np.append(each.toward_light, 0.0) for each in (before, seen))
-            cast = [nearest_views(instances, each, now.index)[0] for each in lit]
+            cast = [nearest_views(instances, each, now.index) for each in lit]
             found["shadows"] += int(np.count_nonzero(np.not_equal(*cast)))
             rectangles.append(_rectangles(instances, now.take(switched), seen.viewer))
         for then, now in zip(before.shares, seen.shares, strict=True):
@@ -173,19 +196,20 @@ def switches_held(before: Seen, now: Seen, kinds: Sequence[str]) -> Iterator[Non
     """Views, tiles' mip levels and shadows' views are chosen as for an earlier frame, and nothing known is relit."""
     eye = before.viewer.eye
     turned = np.append(np.subtract(before.toward_light, now.toward_light), 0.0)
-    quads_toward, levels_of = impostors.quads_toward, impostors._levels
+    levels_of, shown_to, quads_toward = impostors._levels, Batch.shown_to, shadow_strips.quads_toward
 
     def quads(instances: Instances, _eye: NDArray[np.float64], viewer: Viewer | None = None) -> Quads:
         return _with_view(instances, quads_toward(instances, _eye, viewer), eye)
 
-    def levels(batch: impostors.Batch, quads: Quads, viewer: Viewer) -> NDArray[np.intp]:
-        in_front = before.viewer.pixels_per_metre(quads.origin) > 0
+    def levels(batch: Batch, quads: Quads, viewer: Viewer) -> NDArray[np.intp]:
+        in_front = before.viewer.pixels_per_metre(quads.middle) > 0
         return np.where(in_front, levels_of(batch, quads, before.viewer), levels_of(batch, quads, viewer))
 
     with ExitStack() as stack:
         hold: Callable[..., object] = lambda *arguments: stack.enter_context(patch.object(*arguments))  # noqa: E731
-        if "views" in kinds:
-            hold(impostors, "quads_toward", quads)
+        # As in a frame of its own, in which no time has passed, and of which nobody asks what it fades to.
+        hold(Batch, "shown_to", lambda batch, viewer, _, fade: shown_to(batch, viewer, 0.0, fade))
+        hold(ViewFades, "update", _only_what_is_new)
         if "shadows" in kinds:
             hold(shadow_strips, "quads_toward", quads)
             hold(shadow_strips, "nearest_views", lambda fan, toward, index: nearest_views(fan, toward + turned, index))
@@ -196,9 +220,16 @@ def switches_held(before: Seen, now: Seen, kinds: Sequence[str]) -> Iterator[Non
         yield
 
 
+def _only_what_is_new(fades: ViewFades, copies: NDArray[np.intp], nearest: NDArray[np.intp], *_: float) -> None:
+    """Instead of `ViewFades.update`: only copies that were not in the last frame get a view."""
+    new = fades._seen.take(copies) != fades._frame
+    fades.shown[copies[new]], fades.share[copies[new]] = nearest[new], 1
+    fades.fading = bool((fades.share.take(copies) < 1).any())
+
+
 def _with_view(instances: Instances, quads: Quads, eye: NDArray[np.float64]) -> Quads:
     """The same copies with the views nearest to another eye."""
-    return replace(quads, view=nearest_views(instances, eye, quads.index)[0])
+    return replace(quads, view=nearest_views(instances, eye, quads.index))
 
 
 def _rectangles(instances: Instances, quads: Quads, viewer: Viewer) -> NDArray[np.intp]:
@@ -245,6 +276,11 @@ def run(bench: Workbench) -> Table:
         *(
             (kind, f"of that {label}", lambda kind=kind: flown(Flight(bench.ctx, fans), *STRETCH, (kind,)))
             for kind, label in (("views", "views alone"), ("tiles", "mip levels alone"), ("shadows", "shadows alone"))
+        ),
+        (
+            "hard",
+            "all fans, views switched at once",
+            lambda: flown(Flight(bench.ctx, fans, view_fade_seconds=0), *STRETCH),
         ),
         ("192", "all fans, of 192 views", lambda: flown(Flight(bench.ctx, _with_views(bench, fans, 192)), *STRETCH)),
         ("near 128", "all meshes above 128 px", lambda: flown(Flight(bench.ctx, meshes, near), *STRETCH)),

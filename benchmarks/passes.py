@@ -23,7 +23,7 @@ from benchmarks.tables import Row, Table
 from benchmarks.workbench import SAMPLES, Workbench, say
 from impostor.model import load_model
 from impostor.scene import Scene
-from runtime import impostors, lod, relight, relighting, shadow_strips
+from runtime import batch, impostors, lod, relight, relighting, shadow_strips
 from runtime.canvas import Canvas
 from runtime.grounds import GroundPass
 from runtime.meshes import MeshPass
@@ -36,7 +36,7 @@ START = 4.0  # seconds along the forest's path
 COUNT = 10_000
 PARTS: dict[str, tuple[str, tuple[tuple[Any, str], ...]]] = {
     "levels": ("levels of detail: which copies are meshes", ((lod.Levels, "update"), (lod.Levels, "copies"))),
-    "choice": ("selection and culling: which copies, which views", ((impostors.Batch, "seen_by"),)),
+    "choice": ("selection and culling: which copies, which views", ((batch.Batch, "shown_to"),)),
     "tiles": ("places of tiles, records, sorting, upload", ((impostors.ImpostorPass, "_arrange"),)),
     "colormaps": ("colormaps", ((relight.ColormapPass, "write"),)),
     "relight": ("tiles through their colormaps", ((relighting.Relighter, "relight"),)),

@@ -40,7 +40,7 @@ def scene(tmp_path):
 
 
 def test_only_the_frame_in_which_a_view_switches_pops(ctx, scene):
-    flight = Flight(ctx, scene)
+    flight = Flight(ctx, scene, view_fade_seconds=0)
     frames = [frame for frame, *_ in flight.frames(29)]
     (switching,) = [number for number, frame in enumerate(frames) if frame.switches["views"]]
     pops = [frame.pop.max() for frame in frames]
@@ -48,6 +48,15 @@ def test_only_the_frame_in_which_a_view_switches_pops(ctx, scene):
     assert len(frames[switching].copies) == 1 and frames[switching].copies[0, 0] > 0
     assert all(frame.motion.max() > 0 for frame in frames)
     flight.release()
+
+
+def test_a_crossfade_spreads_the_pop_over_its_frames(ctx, scene):
+    hard, soft = (Flight(ctx, scene, view_fade_seconds=seconds) for seconds in (0.0, 0.2))
+    at_once, spread = ([frame.pop.max() for frame, *_ in flight.frames(29)] for flight in (hard, soft))
+    assert 5 <= np.count_nonzero(spread) <= 7
+    assert max(spread) < max(at_once) / 2
+    for flight in (hard, soft):
+        flight.release()
 
 
 def test_a_kind_that_is_not_held_back_does_not_pop(ctx, scene):
