@@ -235,10 +235,12 @@ class ImpostorPass:
         cells = 0 if alike else self._cells.numbers(quads.origin)
         keys = tile_keys(instances.yaws.take(quads.index), quads.view, levels, cells)
         records = batch.records_with(index)
-        changed = records.changed(shown.slots, keys, quads.placement)
-        if len(changed):
-            entries = _find_or_place(index, cache, keys[changed], fan.size)
-            records.write(shown.slots[changed], keys[changed], entries, quads.take(changed), levels[changed])
+        other = records.other_tiles(shown.slots, keys)
+        if len(other):
+            records.show(shown.slots[other], keys[other], _find_or_place(index, cache, keys[other], fan.size))
+        due = records.outdated(shown.slots, quads.placement)
+        if len(due):
+            records.write(shown.slots[due], quads.take(due), levels[due])
         entries = records.entries(shown.slots)
         one_quad = np.full(len(index.places), -1)
         one_quad[entries] = np.arange(len(entries))

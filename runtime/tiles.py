@@ -84,28 +84,18 @@ class TileCache:
         CacheFull
             They do not all fit; tiles placed before stay where they are.
         """
-        sizes = np.asarray(sizes, np.int64)
-        places = np.empty((len(sizes), 3), np.int32)
-        for size in np.unique(sizes).tolist():
-            chosen = np.flatnonzero(sizes == size)
-            places[chosen, :2], places[chosen, 2] = self._place(size, len(chosen)), size
-        return places
+        return np.array([self._place(size) for size in np.asarray(sizes).tolist()], np.int32).reshape(-1, 3)
 
-    def _place(self, size: int, count: int) -> NDArray[np.int64]:
-        """Where (N, 2) so many tiles of one size go."""
+    def _place(self, size: int) -> tuple[int, int, int]:
         cell = size + 2 * GUTTER
-        a_shelf, (shelf, used) = self.side // cell, self._open.get(size, (0, 0))
-        left = min(-used % a_shelf, count)
-        shelves = -(-(count - left) // a_shelf)
-        if self._top + shelves * cell > self.side:
-            raise CacheFull
-        old = np.stack([used + np.arange(left), np.full(left, shelf)], axis=-1)
-        row, column = np.divmod(np.arange(count - left), a_shelf)
-        new = np.stack([column, self._top + row * cell], axis=-1)
-        found = np.concatenate([old, new])
-        self._top += shelves * cell
-        self._open[size] = int(found[-1, 1]), int(found[-1, 0]) + 1
-        return found * (cell, 1) + GUTTER
+        shelf, used = self._open.get(size, (0, 0))
+        if used % (self.side // cell) == 0:
+            if self._top + cell > self.side:
+                raise CacheFull
+            shelf, used = self._top, 0
+            self._top += cell
+        self._open[size] = shelf, used + 1
+        return used * cell + GUTTER, shelf + GUTTER, size
 
     def release(self) -> None:
         """Free the textures."""
@@ -114,7 +104,7 @@ class TileCache:
 
 
 class TileIndex:
-    """Which tiles of one fan are in the cache, found by number for many at once.
+    """Which tiles of one fan are in the cache, found by number.
 
     Attributes
     ----------
@@ -125,8 +115,19 @@ class TileIndex:
     """
 
     def __init__(self):
-        self._keys, self._entries = np.empty(0, np.int64), np.empty(0, np.intp)
-        self.places, self.versions = np.empty((0, 3), np.int32), np.empty(0, np.int64)
+        self._entries: dict[int, int] = {}
+        self._places, self._versions = np.empty((64, 3), np.int32), np.full(64, -1)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    @property
+    def places(self) -> NDArray[np.int32]:
+        return self._places[: len(self)]
+
+    @property
+    def versions(self) -> NDArray[np.int64]:
+        return self._versions[: len(self)]
 
     def find(self, keys: NDArray[np.int64]) -> NDArray[np.intp]:
         """Where tiles stand in `places`; -1 for those that are not there.
@@ -139,20 +140,18 @@ class TileIndex:
         -------
         ndarray, (N,) intp
         """
-        if not len(self._keys):
-            return np.full(len(keys), -1, np.intp)
-        at = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
-        return np.where(self._keys[at] == keys, self._entries[at], -1)
+        entries = self._entries
+        return np.array([entries.get(key, -1) for key in keys.tolist()], np.intp)
 
     def add(self, keys: NDArray[np.int64], places: NDArray[np.int32]) -> None:
         """Take in tiles (N,) that are not there yet and their places (N, 3)."""
-        order = np.argsort(keys)
-        entries = np.arange(len(self.places), len(self.places) + len(keys))
-        at = np.searchsorted(self._keys, keys[order])
-        self._keys = np.insert(self._keys, at, keys[order])
-        self._entries = np.insert(self._entries, at, entries[order])
-        self.places = np.concatenate([self.places, places])
-        self.versions = np.concatenate([self.versions, np.full(len(keys), -1)])
+        first, end = len(self), len(self) + len(keys)
+        if end > len(self._versions):
+            # Room for twice as many: most frames add a few.
+            self._places = np.resize(self._places, (2 * end, 3))
+            self._versions = np.concatenate([self.versions, np.full(2 * end - first, -1)])
+        self._places[first:end] = places
+        self._entries.update(zip(keys.tolist(), range(first, end), strict=True))
 
 
 class CellIndex:
