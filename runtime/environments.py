@@ -21,6 +21,7 @@ ROOM_ROWS = 9  # of four numbers, of each room in that array
 ABSENT = 3  # the shape of a room that is not there
 BRIGHTEST = 65504.0  # that 16 bits can hold
 LEAST_SIZE = 8  # of a level's faces in texels
+DIFFUSE_SIZE = 32  # of the faces of the diffuse light in texels, as the shader has it
 
 
 class Place(NamedTuple):
@@ -70,6 +71,27 @@ class EnvironmentAtlas:
             self._write(environment, corner) for environment, corner in zip(environments, corners, strict=True)
         )
 
+    def diffuse_faces(self, place: Place) -> NDArray[np.float64]:
+        """Where the diffuse light of an environment lies, as `texel_of` of `environment.glsl` reads it, (3, 2)."""
+        return self._faces(place, level_origin(place.size, max(place.levels, 2)), DIFFUSE_SIZE)
+
+    def mirrored_faces(self, place: Place, roughness: float) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+        """Two levels that surfaces of some roughness mirror, and how far it is from the first to the second."""
+        height = roughness * (place.levels - 1)
+        finer = min(int(height), max(place.levels - 2, 0))
+        coarser = min(finer + 1, place.levels - 1)
+        first, second = (self._level_faces(place, level) for level in (finer, coarser))
+        return first, second, height - finer
+
+    def _level_faces(self, place: Place, level: int) -> NDArray[np.float64]:
+        size = place.size >> level
+        x, y = level_origin(place.size, level)
+        return self._faces(place, (x + 3 * (size + 2) * (level > 0), y), size)
+
+    def _faces(self, place: Place, origin: tuple[int, int], size: int) -> NDArray[np.float64]:
+        middle = np.add(place.origin, origin) + size / 2 + 1
+        return np.stack([middle, (size / 2,) * 2, (size + 2,) * 2]) / self.texture.size
+
     def _write(self, environment: Environment, corner: tuple[int, int]) -> Place:
         size, count = environment.size, len(environment.levels)
         for level, halved in enumerate(_halvings(environment.faces, count)):
@@ -116,13 +138,14 @@ class RoomTable:
 
     Attributes
     ----------
+    rooms : tuple of Room
     version : int
         Grows whenever the rooms change; what was lit in older ones is stale.
     """
 
     def __init__(self, ctx: moderngl.Context):
         self._ctx = ctx
-        self._rooms: tuple[Room, ...] = ()
+        self.rooms: tuple[Room, ...] = ()
         self._key: tuple[Hashable, ...] = ()
         self._environments: tuple[Environment, ...] = ()
         self._atlas: EnvironmentAtlas | None = None
@@ -130,7 +153,7 @@ class RoomTable:
         self.version = 0
 
     def __len__(self) -> int:
-        return len(self._rooms)
+        return len(self.rooms)
 
     def update(self, rooms: Sequence[Room]) -> None:
         """Take over the rooms of this frame; nothing is written when they are those of the last one."""
@@ -142,23 +165,35 @@ class RoomTable:
             self.release()
             self._atlas = EnvironmentAtlas(self._ctx, environments) if environments else None
             self._environments = environments
-        places = {} if self._atlas is None else dict(zip(map(id, self._environments), self._atlas.places, strict=True))
-        packed = [_room_rows(room, places[id(room.environment)]) for room in rooms]
+        packed = [_room_rows(room, self._place(room.environment)) for room in rooms]
         # Those that are absent are looked at, too: what they show must be a number.
         self._rows[:] = np.array([*packed, *packed[:1] * (MAX_ROOMS - len(packed))]) if packed else 0
         self._rows[len(packed) :, 3, 3] = ABSENT
-        self._rooms, self._key = tuple(rooms), key
+        self.rooms, self._key = tuple(rooms), key
         self.version += 1
 
     def bind(self, program: moderngl.Program, unit: int, first: int = 0) -> None:
         """Give a program that includes `rooms.glsl` its uniforms, beginning with some room; there must be one."""
-        assert self._atlas is not None
-        self._atlas.texture.use(unit)
+        self.atlas.texture.use(unit)
         # A program that reads the first room only has a shorter array.
         array = program["rooms"]
         assert isinstance(array, moderngl.Uniform)
         rows = self._rows[first:].reshape(-1, 4)[: array.array_length]
         set_uniforms(program, environments=unit, rooms=rows.ravel())
+
+    @property
+    def atlas(self) -> EnvironmentAtlas:
+        """What holds the environments; there must be a room."""
+        assert self._atlas is not None
+        return self._atlas
+
+    def place(self, number: int) -> Place:
+        """Where in `atlas` the environment of a room lies."""
+        return self._place(self.rooms[number].environment)
+
+    def _place(self, environment: Environment) -> Place:
+        places = zip(self._environments, self.atlas.places, strict=True)
+        return next(place for each, place in places if each is environment)
 
     def alone_around(self, centers: NDArray[np.float64], radii: NDArray[np.float64]) -> NDArray[np.intp]:
         """The room that alone lights and is mirrored by all that is in a sphere, (N,); -1 where there may be others.
@@ -169,8 +204,8 @@ class RoomTable:
             World space.
         radii : ndarray, (N,) float64
         """
-        far = [room.shape == "far" for room in self._rooms]
-        found = np.array([_within(room, centers, radii) for room in self._rooms])
+        far = [room.shape == "far" for room in self.rooms]
+        found = np.array([_within(room, centers, radii) for room in self.rooms])
         inside, beside = found[:, 0], found[:, 1]
         others = (~beside).sum(axis=0)
         alone = np.where(inside.any(axis=0) & (others == 1), inside.argmax(axis=0), -1)
@@ -180,7 +215,7 @@ class RoomTable:
         """Free the texture."""
         if self._atlas is not None:
             self._atlas.release()
-        self._atlas, self._environments, self._rooms, self._key = None, (), (), ()
+        self._atlas, self._environments, self.rooms, self._key = None, (), (), ()
 
 
 def _within(
@@ -223,7 +258,7 @@ def _extent(size: int) -> tuple[int, int]:
     """Width and height of all that belongs to an environment, with an alley that the filter does not cross."""
     levels = (size // LEAST_SIZE).bit_length()
     x, y = level_origin(size, max(levels, 2))
-    diffuse = 34
+    diffuse = DIFFUSE_SIZE + 2
     return max(3 * (size + 2), 6 * (size // 2 + 2), x + 3 * diffuse), y + 2 * max(size // 4 + 2, diffuse)
 
 
