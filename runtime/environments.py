@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impostor.environment.blending import EDGE
-from impostor.environment.cube import padded
+from impostor.environment.colormap import mirrored_faces
+from impostor.environment.cube import halved, padded
 from impostor.environment.environment import Environment
 from impostor.environment.room import SHAPES, Room
 from impostor.errors import GpuError, SettingsError
@@ -20,6 +21,7 @@ MAX_ROOMS = 4  # as the shader's array has it
 ROOM_ROWS = 9  # of four numbers, of each room in that array
 ABSENT = 3  # the shape of a room that is not there
 BRIGHTEST = 65504.0  # that 16 bits can hold
+MOST_MIRRORED = 16  # textures of what fans mirror
 LEAST_SIZE = 8  # of a level's faces in texels
 DIFFUSE_SIZE = 32  # of the faces of the diffuse light in texels, as the shader has it
 
@@ -72,49 +74,55 @@ class EnvironmentAtlas:
         )
 
     def diffuse_faces(self, place: Place) -> NDArray[np.float64]:
-        """Where the diffuse light of an environment lies, as `texel_of` of `environment.glsl` reads it, (3, 2)."""
-        return self._faces(place, level_origin(place.size, max(place.levels, 2)), DIFFUSE_SIZE)
-
-    def mirrored_faces(self, place: Place, roughness: float) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-        """Two levels that surfaces of some roughness mirror, and how far it is from the first to the second."""
-        height = roughness * (place.levels - 1)
-        finer = min(int(height), max(place.levels - 2, 0))
-        coarser = min(finer + 1, place.levels - 1)
-        first, second = (self._level_faces(place, level) for level in (finer, coarser))
-        return first, second, height - finer
-
-    def _level_faces(self, place: Place, level: int) -> NDArray[np.float64]:
-        size = place.size >> level
-        x, y = level_origin(place.size, level)
-        return self._faces(place, (x + 3 * (size + 2) * (level > 0), y), size)
-
-    def _faces(self, place: Place, origin: tuple[int, int], size: int) -> NDArray[np.float64]:
-        middle = np.add(place.origin, origin) + size / 2 + 1
-        return np.stack([middle, (size / 2,) * 2, (size + 2,) * 2]) / self.texture.size
+        """Where the diffuse light of an environment lies, as `faces_at` says."""
+        x, y = level_origin(place.size, max(place.levels, 2))
+        return faces_at((place.origin[0] + x, place.origin[1] + y), DIFFUSE_SIZE, self.texture.size)
 
     def _write(self, environment: Environment, corner: tuple[int, int]) -> Place:
         size, count = environment.size, len(environment.levels)
-        for level, halved in enumerate(_halvings(environment.faces, count)):
+        for level, faces in enumerate(_halvings(environment.faces, count)):
             x, y = level_origin(size, level)
-            self._write_faces(halved, corner[0] + x, corner[1] + y)
+            _write_faces(self.texture, faces, corner[0] + x, corner[1] + y)
             if level:
-                x += 3 * (halved.shape[1] + 2)
-                self._write_faces(environment.levels[level], corner[0] + x, corner[1] + y)
+                x += 3 * (faces.shape[1] + 2)
+                _write_faces(self.texture, environment.levels[level], corner[0] + x, corner[1] + y)
         x, y = level_origin(size, max(count, 2))
-        self._write_faces(environment.diffuse, corner[0] + x, corner[1] + y)
+        _write_faces(self.texture, environment.diffuse, corner[0] + x, corner[1] + y)
         return Place(corner, size, count)
-
-    def _write_faces(self, faces: NDArray[np.float32], x: int, y: int) -> None:
-        """Write six faces, three beside each other in each of two rows."""
-        bordered = padded(np.minimum(faces, BRIGHTEST))
-        side = bordered.shape[1]
-        texels = np.zeros((2, side, 3, side, 4), np.float16)
-        texels[..., :3] = bordered.reshape(2, 3, side, side, 3).swapaxes(1, 2)
-        self.texture.write(texels.tobytes(), viewport=(x, y, 3 * side, 2 * side))
 
     def release(self) -> None:
         """Free the texture."""
         self.texture.release()
+
+
+class MirroredFaces:
+    """What fans of some roughness mirror of an environment in a texture each: one look-up instead of two."""
+
+    def __init__(self, ctx: moderngl.Context):
+        self._ctx = ctx
+        self._made: dict[tuple[Environment, float], moderngl.Texture] = {}
+
+    def use(self, environment: Environment, roughness: float, unit: int) -> NDArray[np.float64]:
+        """Bind the texture, and say where its faces lie, as `faces_at` does."""
+        key = environment, roughness
+        if key not in self._made:
+            while len(self._made) >= MOST_MIRRORED:
+                self._made.pop(next(iter(self._made))).release()
+            faces = mirrored_faces(environment, roughness)
+            side = faces.shape[1] + 2
+            texture = self._ctx.texture((3 * side, 2 * side), 4, dtype="f2")
+            texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+            _write_faces(texture, faces, 0, 0)
+            self._made[key] = texture
+        # The last used stays longest.
+        texture = self._made[key] = self._made.pop(key)
+        texture.use(unit)
+        return faces_at((0, 0), texture.width // 3 - 2, texture.size)
+
+    def keep(self, environments: Sequence[Environment]) -> None:
+        """Free what is not of these environments."""
+        for key in [key for key in self._made if key[0] not in environments]:
+            self._made.pop(key).release()
 
 
 def check_rooms(rooms: Sequence[Room]) -> None:
@@ -139,6 +147,7 @@ class RoomTable:
     Attributes
     ----------
     rooms : tuple of Room
+    mirrored : MirroredFaces
     version : int
         Grows whenever the rooms change; what was lit in older ones is stale.
     """
@@ -149,6 +158,7 @@ class RoomTable:
         self._key: tuple[Hashable, ...] = ()
         self._environments: tuple[Environment, ...] = ()
         self._atlas: EnvironmentAtlas | None = None
+        self.mirrored = MirroredFaces(ctx)
         self._rows = np.zeros((MAX_ROOMS, ROOM_ROWS, 4), np.float32)
         self.version = 0
 
@@ -165,6 +175,7 @@ class RoomTable:
             self.release()
             self._atlas = EnvironmentAtlas(self._ctx, environments) if environments else None
             self._environments = environments
+            self.mirrored.keep(environments)
         packed = [_room_rows(room, self._place(room.environment)) for room in rooms]
         # Those that are absent are looked at, too: what they show must be a number.
         self._rows[:] = np.array([*packed, *packed[:1] * (MAX_ROOMS - len(packed))]) if packed else 0
@@ -212,9 +223,10 @@ class RoomTable:
         return np.where(others == 0, far.index(True), alone) if sum(far) == 1 else alone
 
     def release(self) -> None:
-        """Free the texture."""
+        """Free the textures."""
         if self._atlas is not None:
             self._atlas.release()
+        self.mirrored.keep(())
         self._atlas, self._environments, self.rooms, self._key = None, (), (), ()
 
 
@@ -277,5 +289,19 @@ def _halvings(faces: NDArray[np.float32], count: int) -> Iterator[NDArray[np.flo
     """Faces, then each time half as large, every texel the mean of four."""
     for _ in range(count):
         yield faces
-        size = faces.shape[1] // 2
-        faces = faces.reshape(6, size, 2, size, 2, 3).mean(axis=(2, 4))
+        faces = halved(faces)
+
+
+def faces_at(origin: tuple[int, int], size: int, texture: tuple[int, int]) -> NDArray[np.float64]:
+    """Where six faces lie in a texture of some size, as `texel_of` of `environment.glsl` reads it, (3, 2) float64."""
+    middle = np.add(origin, size / 2 + 1)
+    return np.stack([middle, (size / 2,) * 2, (size + 2,) * 2]) / texture
+
+
+def _write_faces(texture: moderngl.Texture, faces: NDArray[np.float32], x: int, y: int) -> None:
+    """Write six faces, three beside each other in each of two rows."""
+    bordered = padded(np.minimum(faces, BRIGHTEST))
+    side = bordered.shape[1]
+    texels = np.zeros((2, side, 3, side, 4), np.float16)
+    texels[..., :3] = bordered.reshape(2, 3, side, side, 3).swapaxes(1, 2)
+    texture.write(texels.tobytes(), viewport=(x, y, 3 * side, 2 * side))

@@ -10,7 +10,6 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from impostor.environment.colormap import SHARPEST
 from impostor.environment.reflection import Reflection
 from impostor.normal_code import BYTE_TO_NORMAL, CODE_COUNT
 from runtime.environments import MAX_ROOMS, RoomTable
@@ -96,12 +95,15 @@ class ColormapPass:
     ROWS = 1024
 
     def __init__(self, ctx: moderngl.Context):
-        self._normals = ctx.texture((256, 1), 4, _padded_normals().tobytes(), dtype="f4")
+        self._normals, self._fresnel = (
+            ctx.texture((256, 1), 4, _padded_normals().tobytes(), dtype="f4") for _ in range(2)
+        )
+        self._reflection: Reflection | None = None  # whose part of the light `_fresnel` has
         size = TILE * TILES_ACROSS, TILE * self.ROWS // TILES_ACROSS
         # Entries without a normal, and what is on no albedo, stay zero.
         self.texture = ctx.texture((2 * size[0], size[1]), 4, bytes(2 * size[0] * size[1] * 16), dtype="f4")
         self._made = ctx.texture(size, 4, dtype="f4")
-        for texture in (self.texture, self._normals, self._made):
+        for texture in (self.texture, self._normals, self._fresnel, self._made):
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._target, self._made_target = ctx.framebuffer([self.texture]), ctx.framebuffer([self._made])
         self._rows, self._places = InstanceBuffer(ctx, ROW_DTYPE), InstanceBuffer(ctx, PLACE_DTYPE)
@@ -189,19 +191,37 @@ class ColormapPass:
             yield "gloss", {"parts": (0, 1)}
         if surroundings is None:
             return
-        surroundings.rooms.atlas.texture.use(3)
         for number in range(len(surroundings.rooms)):
             if metal < 1:
+                surroundings.rooms.atlas.texture.use(3)
                 yield "diffuse", {"parts": (1 - metal, 0), **_diffuse(surroundings, number)}
             if reflection is not None:
                 parts = metal, 1 - metal
+                self._mirrors(reflection)
                 if surroundings.rooms.rooms[number].shape == "far":
-                    yield "far", {"parts": parts, **_mirrored(surroundings, reflection, number)}
+                    yield "far", {"parts": parts, **_mirrored(surroundings, reflection, number), "byte_to_normal": 4}
                 else:
                     assert surroundings.points is not None
                     surroundings.points.use(5)
                     surroundings.rooms.bind(self._arrays["near"].program, 3, first=number)
-                    yield "near", {"parts": parts, "points": 5, **_mirrored(surroundings, reflection, number)}
+                    yield (
+                        "near",
+                        {
+                            "parts": parts,
+                            "points": 5,
+                            **_mirrored(surroundings, reflection, number),
+                            "byte_to_normal": 4,
+                        },
+                    )
+
+    def _mirrors(self, reflection: Reflection) -> None:
+        """Bind normals with the part of the light that a surface mirrors by way of each."""
+        self._fresnel.use(4)
+        if reflection != self._reflection:
+            normals = _padded_normals()
+            normals[:CODE_COUNT, 3] = reflection.fresnel(normals[:CODE_COUNT, 2])
+            self._fresnel.write(normals.tobytes())
+            self._reflection = reflection
 
     def _draw(self, name: str, count: int, **uniforms: Any) -> None:
         array, wanted = self._arrays[name], self._uniforms[name]
@@ -224,6 +244,7 @@ class ColormapPass:
             self.texture,
             self._made,
             self._normals,
+            self._fresnel,
         ):
             resource.release()
 
@@ -243,18 +264,10 @@ def _diffuse(surroundings: Surroundings, number: int) -> dict[str, Any]:
 
 
 def _mirrored(surroundings: Surroundings, reflection: Reflection, number: int) -> dict[str, Any]:
-    """The uniforms of what is mirrored of one of the rooms."""
+    """The uniforms of what is mirrored of one of the rooms, whose texture is bound then."""
     table = surroundings.rooms
-    room, roughness = table.rooms[number], max(reflection.roughness, SHARPEST)
-    finer, coarser, between = table.atlas.mirrored_faces(table.place(number), roughness)
-    light = {
-        "environments": 3,
-        "finer": finer,
-        "coarser": coarser,
-        "between": between,
-        "reflection": (reflection.strength, reflection.least, reflection.exponent, roughness),
-        "any_power": int(reflection.exponent not in (4, 5)),
-    }
+    room = table.rooms[number]
+    light = {"environments": 3, "level": table.mirrored.use(room.environment, reflection.roughness, 3)}
     if room.shape == "far":
         return light | {"turn": room.environment_from_world} | _shares(table, number, "of_chosen", room.exposure)
     matrix = room.room_from_world
