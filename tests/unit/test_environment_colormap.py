@@ -116,7 +116,7 @@ class TestMirroredFaces:
     def test_one_look_up_is_what_two_levels_mix(self, roughness):
         toward = self.random.normal(size=(2000, 3))
         found = sample(mirrored_faces(self.waves, roughness), toward)
-        np.testing.assert_allclose(found, self.waves.mirrored(toward, max(roughness, SHARPEST)), atol=0.005)
+        np.testing.assert_allclose(found, self.waves.mirrored(toward, max(roughness, SHARPEST)), atol=0.01)
 
     def test_they_are_no_finer_than_codes_can_show(self):
         fine = Environment("fine", self.random.random((6, 2 * FINEST, 2 * FINEST, 3), np.float32))
