@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impostor.environment.blending import EDGE
-from impostor.environment.cube import padded
+from impostor.environment.colormap import mirrored_faces
+from impostor.environment.cube import halved, padded
 from impostor.environment.environment import Environment
 from impostor.environment.room import SHAPES, Room
 from impostor.errors import GpuError, SettingsError
@@ -20,7 +21,9 @@ MAX_ROOMS = 4  # as the shader's array has it
 ROOM_ROWS = 9  # of four numbers, of each room in that array
 ABSENT = 3  # the shape of a room that is not there
 BRIGHTEST = 65504.0  # that 16 bits can hold
+MOST_MIRRORED = 16  # textures of what fans mirror
 LEAST_SIZE = 8  # of a level's faces in texels
+DIFFUSE_SIZE = 32  # of the faces of the diffuse light in texels, as the shader has it
 
 
 class Place(NamedTuple):
@@ -70,29 +73,56 @@ class EnvironmentAtlas:
             self._write(environment, corner) for environment, corner in zip(environments, corners, strict=True)
         )
 
+    def diffuse_faces(self, place: Place) -> NDArray[np.float64]:
+        """Where the diffuse light of an environment lies, as `faces_at` says."""
+        x, y = level_origin(place.size, max(place.levels, 2))
+        return faces_at((place.origin[0] + x, place.origin[1] + y), DIFFUSE_SIZE, self.texture.size)
+
     def _write(self, environment: Environment, corner: tuple[int, int]) -> Place:
         size, count = environment.size, len(environment.levels)
-        for level, halved in enumerate(_halvings(environment.faces, count)):
+        for level, faces in enumerate(_halvings(environment.faces, count)):
             x, y = level_origin(size, level)
-            self._write_faces(halved, corner[0] + x, corner[1] + y)
+            _write_faces(self.texture, faces, corner[0] + x, corner[1] + y)
             if level:
-                x += 3 * (halved.shape[1] + 2)
-                self._write_faces(environment.levels[level], corner[0] + x, corner[1] + y)
+                x += 3 * (faces.shape[1] + 2)
+                _write_faces(self.texture, environment.levels[level], corner[0] + x, corner[1] + y)
         x, y = level_origin(size, max(count, 2))
-        self._write_faces(environment.diffuse, corner[0] + x, corner[1] + y)
+        _write_faces(self.texture, environment.diffuse, corner[0] + x, corner[1] + y)
         return Place(corner, size, count)
-
-    def _write_faces(self, faces: NDArray[np.float32], x: int, y: int) -> None:
-        """Write six faces, three beside each other in each of two rows."""
-        bordered = padded(np.minimum(faces, BRIGHTEST))
-        side = bordered.shape[1]
-        texels = np.zeros((2, side, 3, side, 4), np.float16)
-        texels[..., :3] = bordered.reshape(2, 3, side, side, 3).swapaxes(1, 2)
-        self.texture.write(texels.tobytes(), viewport=(x, y, 3 * side, 2 * side))
 
     def release(self) -> None:
         """Free the texture."""
         self.texture.release()
+
+
+class MirroredFaces:
+    """What fans of some roughness mirror of an environment in a texture each: one look-up instead of two."""
+
+    def __init__(self, ctx: moderngl.Context):
+        self._ctx = ctx
+        self._made: dict[tuple[Environment, float], moderngl.Texture] = {}
+
+    def use(self, environment: Environment, roughness: float, unit: int) -> NDArray[np.float64]:
+        """Bind the texture, and say where its faces lie, as `faces_at` does."""
+        key = environment, roughness
+        if key not in self._made:
+            while len(self._made) >= MOST_MIRRORED:
+                self._made.pop(next(iter(self._made))).release()
+            faces = mirrored_faces(environment, roughness)
+            side = faces.shape[1] + 2
+            texture = self._ctx.texture((3 * side, 2 * side), 4, dtype="f2")
+            texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+            _write_faces(texture, faces, 0, 0)
+            self._made[key] = texture
+        # The last used stays longest.
+        texture = self._made[key] = self._made.pop(key)
+        texture.use(unit)
+        return faces_at((0, 0), texture.width // 3 - 2, texture.size)
+
+    def keep(self, environments: Sequence[Environment]) -> None:
+        """Free what is not of these environments."""
+        for key in [key for key in self._made if key[0] not in environments]:
+            self._made.pop(key).release()
 
 
 def check_rooms(rooms: Sequence[Room]) -> None:
@@ -116,21 +146,24 @@ class RoomTable:
 
     Attributes
     ----------
+    rooms : tuple of Room
+    mirrored : MirroredFaces
     version : int
         Grows whenever the rooms change; what was lit in older ones is stale.
     """
 
     def __init__(self, ctx: moderngl.Context):
         self._ctx = ctx
-        self._rooms: tuple[Room, ...] = ()
+        self.rooms: tuple[Room, ...] = ()
         self._key: tuple[Hashable, ...] = ()
         self._environments: tuple[Environment, ...] = ()
         self._atlas: EnvironmentAtlas | None = None
+        self.mirrored = MirroredFaces(ctx)
         self._rows = np.zeros((MAX_ROOMS, ROOM_ROWS, 4), np.float32)
         self.version = 0
 
     def __len__(self) -> int:
-        return len(self._rooms)
+        return len(self.rooms)
 
     def update(self, rooms: Sequence[Room]) -> None:
         """Take over the rooms of this frame; nothing is written when they are those of the last one."""
@@ -142,23 +175,36 @@ class RoomTable:
             self.release()
             self._atlas = EnvironmentAtlas(self._ctx, environments) if environments else None
             self._environments = environments
-        places = {} if self._atlas is None else dict(zip(map(id, self._environments), self._atlas.places, strict=True))
-        packed = [_room_rows(room, places[id(room.environment)]) for room in rooms]
+            self.mirrored.keep(environments)
+        packed = [_room_rows(room, self._place(room.environment)) for room in rooms]
         # Those that are absent are looked at, too: what they show must be a number.
         self._rows[:] = np.array([*packed, *packed[:1] * (MAX_ROOMS - len(packed))]) if packed else 0
         self._rows[len(packed) :, 3, 3] = ABSENT
-        self._rooms, self._key = tuple(rooms), key
+        self.rooms, self._key = tuple(rooms), key
         self.version += 1
 
     def bind(self, program: moderngl.Program, unit: int, first: int = 0) -> None:
         """Give a program that includes `rooms.glsl` its uniforms, beginning with some room; there must be one."""
-        assert self._atlas is not None
-        self._atlas.texture.use(unit)
+        self.atlas.texture.use(unit)
         # A program that reads the first room only has a shorter array.
         array = program["rooms"]
         assert isinstance(array, moderngl.Uniform)
         rows = self._rows[first:].reshape(-1, 4)[: array.array_length]
         set_uniforms(program, environments=unit, rooms=rows.ravel())
+
+    @property
+    def atlas(self) -> EnvironmentAtlas:
+        """What holds the environments; there must be a room."""
+        assert self._atlas is not None
+        return self._atlas
+
+    def place(self, number: int) -> Place:
+        """Where in `atlas` the environment of a room lies."""
+        return self._place(self.rooms[number].environment)
+
+    def _place(self, environment: Environment) -> Place:
+        places = zip(self._environments, self.atlas.places, strict=True)
+        return next(place for each, place in places if each is environment)
 
     def alone_around(self, centers: NDArray[np.float64], radii: NDArray[np.float64]) -> NDArray[np.intp]:
         """The room that alone lights and is mirrored by all that is in a sphere, (N,); -1 where there may be others.
@@ -169,18 +215,19 @@ class RoomTable:
             World space.
         radii : ndarray, (N,) float64
         """
-        far = [room.shape == "far" for room in self._rooms]
-        found = np.array([_within(room, centers, radii) for room in self._rooms])
+        far = [room.shape == "far" for room in self.rooms]
+        found = np.array([_within(room, centers, radii) for room in self.rooms])
         inside, beside = found[:, 0], found[:, 1]
         others = (~beside).sum(axis=0)
         alone = np.where(inside.any(axis=0) & (others == 1), inside.argmax(axis=0), -1)
         return np.where(others == 0, far.index(True), alone) if sum(far) == 1 else alone
 
     def release(self) -> None:
-        """Free the texture."""
+        """Free the textures."""
         if self._atlas is not None:
             self._atlas.release()
-        self._atlas, self._environments, self._rooms, self._key = None, (), (), ()
+        self.mirrored.keep(())
+        self._atlas, self._environments, self.rooms, self._key = None, (), (), ()
 
 
 def _within(
@@ -223,7 +270,7 @@ def _extent(size: int) -> tuple[int, int]:
     """Width and height of all that belongs to an environment, with an alley that the filter does not cross."""
     levels = (size // LEAST_SIZE).bit_length()
     x, y = level_origin(size, max(levels, 2))
-    diffuse = 34
+    diffuse = DIFFUSE_SIZE + 2
     return max(3 * (size + 2), 6 * (size // 2 + 2), x + 3 * diffuse), y + 2 * max(size // 4 + 2, diffuse)
 
 
@@ -242,5 +289,19 @@ def _halvings(faces: NDArray[np.float32], count: int) -> Iterator[NDArray[np.flo
     """Faces, then each time half as large, every texel the mean of four."""
     for _ in range(count):
         yield faces
-        size = faces.shape[1] // 2
-        faces = faces.reshape(6, size, 2, size, 2, 3).mean(axis=(2, 4))
+        faces = halved(faces)
+
+
+def faces_at(origin: tuple[int, int], size: int, texture: tuple[int, int]) -> NDArray[np.float64]:
+    """Where six faces lie in a texture of some size, as `texel_of` of `environment.glsl` reads it, (3, 2) float64."""
+    middle = np.add(origin, size / 2 + 1)
+    return np.stack([middle, (size / 2,) * 2, (size + 2,) * 2]) / texture
+
+
+def _write_faces(texture: moderngl.Texture, faces: NDArray[np.float32], x: int, y: int) -> None:
+    """Write six faces, three beside each other in each of two rows."""
+    bordered = padded(np.minimum(faces, BRIGHTEST))
+    side = bordered.shape[1]
+    texels = np.zeros((2, side, 3, side, 4), np.float16)
+    texels[..., :3] = bordered.reshape(2, 3, side, side, 3).swapaxes(1, 2)
+    texture.write(texels.tobytes(), viewport=(x, y, 3 * side, 2 * side))

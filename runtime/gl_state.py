@@ -21,7 +21,7 @@ UNITS = 6  # texture units that the passes bind, from 0
 
 _BLEND, _DEPTH_TEST, _CULL_FACE, _SCISSOR_TEST, _STENCIL_TEST = 0x0BE2, 0x0B71, 0x0B44, 0x0C11, 0x0B90
 _POLYGON_OFFSET_FILL, _FRAMEBUFFER_SRGB, _RASTERIZER_DISCARD = 0x8037, 0x8DB9, 0x8C89
-_SAMPLE_ALPHA_TO_COVERAGE, _COLOR_LOGIC_OP, _DEPTH_CLAMP = 0x809E, 0x0BF2, 0x864F
+_SAMPLE_ALPHA_TO_COVERAGE, _COLOR_LOGIC_OP, _DEPTH_CLAMP, _PROGRAM_POINT_SIZE = 0x809E, 0x0BF2, 0x864F, 0x8642
 _SWITCHES = (
     _BLEND,
     _DEPTH_TEST,
@@ -34,6 +34,7 @@ _SWITCHES = (
     _SAMPLE_ALPHA_TO_COVERAGE,
     _COLOR_LOGIC_OP,
     _DEPTH_CLAMP,
+    _PROGRAM_POINT_SIZE,
 )
 _VIEWPORT, _SCISSOR_BOX, _COLOR_WRITEMASK, _DEPTH_WRITEMASK, _DEPTH_FUNC = 0x0BA2, 0x0C10, 0x0C23, 0x0B72, 0x0B74
 _BLEND_SRC_RGB, _BLEND_DST_RGB, _BLEND_SRC_ALPHA, _BLEND_DST_ALPHA = 0x80C9, 0x80C8, 0x80CB, 0x80CA
@@ -194,15 +195,18 @@ def set_state(
     color_mask: tuple[bool, bool, bool, bool] | None = None,
     merge_bits: bool = False,
     background: bool = False,
+    points: bool = False,
 ) -> None:
     """Set every switch that a pass relies on; what is not named is off. Depth compares with LESS.
 
     `background` draws what lies before the near plane or behind the far one, too, and where depth is equal.
-    `merge_bits` adds the bits of whole numbers that are drawn to those that are there.
+    `merge_bits` adds the bits of whole numbers that are drawn to those that are there. `points` are as large as the
+    shader says.
     """
     for name in (_STENCIL_TEST, _FRAMEBUFFER_SRGB, _RASTERIZER_DISCARD, _SAMPLE_ALPHA_TO_COVERAGE):
         _switch(name, False)
     _switch(_DEPTH_CLAMP, background)
+    _switch(_PROGRAM_POINT_SIZE, points)
     _switch(_COLOR_LOGIC_OP, merge_bits)
     if merge_bits:
         _call("glLogicOp", _OR)

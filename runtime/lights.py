@@ -38,6 +38,8 @@ class LightTable:
 
     Attributes
     ----------
+    count : int
+    ambient : tuple of float
     rooms : tuple of Room
         What is around, which is not in the texture.
     version : int
@@ -48,8 +50,8 @@ class LightTable:
         self._ctx = ctx
         self._held: tuple[object, ...] | None = None
         self._texture = ctx.texture((2, 1), 4, dtype="f4")
-        self._count = 0
-        self._ambient = (0.0, 0.0, 0.0)
+        self.count = 0
+        self.ambient = (0.0, 0.0, 0.0)
         self.rooms: tuple[Room, ...] = ()
         self.version = 0
         self._past: dict[int, tuple[NDArray[Any], ...]] = {}
@@ -70,10 +72,10 @@ class LightTable:
             self._texture = self._ctx.texture((2, len(rows)), 4, dtype="f4")
         self._texture.write(rows.tobytes())
         self._texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._held, self._count, self._ambient = wanted, len(lights), (red, green, blue)
+        self._held, self.count, self.ambient = wanted, len(lights), (red, green, blue)
         self.rooms = tuple(rooms)
         self.version += 1
-        self._past[self.version] = rows[: len(lights), 0, :3], rows[: len(lights), 1, :3], np.array(self._ambient)
+        self._past[self.version] = rows[: len(lights), 0, :3], rows[: len(lights), 1, :3], np.array(self.ambient)
         self._past_rooms[self.version] = tuple(RoomLight.of(room) for room in rooms)
         for past in (self._past, self._past_rooms):
             past.pop(self.version - REMEMBERED, None)
@@ -96,7 +98,9 @@ class LightTable:
     def bind(self, program: moderngl.Program, unit: int) -> None:
         """Give a program that includes `lights.glsl` its uniforms."""
         self._texture.use(unit)
-        set_uniforms(program, lights=unit, light_count=self._count, ambient=self._ambient)
+        set_uniforms(program, lights=unit, light_count=self.count)
+        if "ambient" in program:  # a program of highlights has none
+            set_uniforms(program, ambient=self.ambient)
 
     def release(self) -> None:
         """Free the texture."""

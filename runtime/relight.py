@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from impostor.environment.colormap import SHARPEST
 from impostor.environment.reflection import Reflection
 from impostor.normal_code import BYTE_TO_NORMAL, CODE_COUNT
-from runtime.environments import RoomTable
+from runtime.environments import MAX_ROOMS, RoomTable
 from runtime.fan_textures import FanTextures
-from runtime.gl_state import set_state
+from runtime.gl_state import clear_color, set_state
 from runtime.gpu import InstanceBuffer, load_program, set_uniforms
 from runtime.lights import LightTable
 from runtime.tiles import TileCache
@@ -33,12 +34,21 @@ PLACE_DTYPE = np.dtype(
         ("weights", "f4", (4,)),
         ("mirrored", "f4", (4,)),
         ("view", "f4"),
-        ("padding", "f4", (3,)),
     ]
 )
-SPAN_DTYPE = np.dtype([("first", "f4", (2,)), ("end", "f4", (2,))])
+# What the shader calls the numbers of these records, and how many they are.
+ROW_ATTRIBUTES = {"number": 1, "right": 3, "up": 3, "back": 3, "albedo": 4, "gloss": 2}
+PLACE_ATTRIBUTES = {"center": 3, "scale": 1, "weights": 4, "chosen": 4, "view": 1}
 TILE_DTYPE = np.dtype([("place", "f4", (4,)), ("part", "f4", (4,)), ("origin", "f4", (3,))])
-PROGRAMS = "colormap", *(f"colormap_{around}{how}" for around in ("room", "rooms") for how in ("", "_mirrored"))
+PROGRAMS = "lights", "gloss", "normals", "diffuse", "far", "near", "srgb", "finished"
+TILE, TILES_ACROSS = 16, 2  # pixels, and rows of a colormap side by side
+DEFAULTS = {
+    "of_all": 1,
+    "of_weights": (0.0,) * MAX_ROOMS,
+    "of_chosen": (0.0,) * MAX_ROOMS,
+    "turn": np.eye(3),
+    "byte_to_normal": 0,
+}
 CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]], np.float32)
 
 
@@ -65,35 +75,49 @@ class Surroundings:
 
 
 class ColormapPass:
-    """Evaluates colormaps on the GPU, one texture row each.
+    """Evaluates colormaps on the GPU.
 
     Equals `impostor.lighting.colormap`, and with surroundings `impostor.environment.colormap`.
 
     Attributes
     ----------
     texture : moderngl.Texture
-        (512, rows) float32 RGBA: linear entries 0-255 multiply the albedo, 256-511 are added
-        on top; of a fan with one albedo, 0-255 are the finished colours on the sRGB curve, and the rest is not used.
+        float32 RGBA: each of `ROWS` rows is two tiles of 16 x 16 texels, entry after entry, where `tile_origins` says.
+        The first holds linear colours that multiply the albedo, the second those that are added on top; of a fan with
+        one albedo the first holds the finished colours on the sRGB curve, and the second is not used.
+
+    Notes
+    -----
+    Lights, and every room, add their light in a program that does nothing else: a software rasteriser also runs what
+    branches and loops leave out. Tiles are points, so that what is the same for a row is worked out once for a vertex.
     """
 
     ROWS = 1024
 
     def __init__(self, ctx: moderngl.Context):
-        self._normals = ctx.texture((256, 1), 4, _padded_normals().tobytes(), dtype="f4")
-        # Entries without a normal stay zero.
-        self.texture = ctx.texture((512, self.ROWS), 4, bytes(512 * self.ROWS * 16), dtype="f4")
-        self._rows = ctx.texture((ROW_DTYPE.itemsize // 16, self.ROWS), 4, dtype="f4")
-        self._places = ctx.texture((PLACE_DTYPE.itemsize // 16, self.ROWS), 4, dtype="f4")
-        for texture in (self.texture, self._normals, self._rows, self._places):
+        self._normals, self._fresnel = (
+            ctx.texture((256, 1), 4, _padded_normals().tobytes(), dtype="f4") for _ in range(2)
+        )
+        self._reflection: Reflection | None = None  # whose part of the light `_fresnel` has
+        size = TILE * TILES_ACROSS, TILE * self.ROWS // TILES_ACROSS
+        # Entries without a normal, and what is on no albedo, stay zero.
+        self.texture = ctx.texture((2 * size[0], size[1]), 4, bytes(2 * size[0] * size[1] * 16), dtype="f4")
+        self._made = ctx.texture(size, 4, dtype="f4")
+        for texture in (self.texture, self._normals, self._fresnel, self._made):
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._target = ctx.framebuffer([self.texture])
-        self._corners = ctx.buffer(CORNERS)
-        self._spans = InstanceBuffer(ctx, SPAN_DTYPE)
+        self._target, self._made_target = ctx.framebuffer([self.texture]), ctx.framebuffer([self._made])
+        self._rows, self._places = InstanceBuffer(ctx, ROW_DTYPE), InstanceBuffer(ctx, PLACE_DTYPE)
         self._arrays = {name: self._array(ctx, name) for name in PROGRAMS}
+        self._uniforms = {name: frozenset(array.program) for name, array in self._arrays.items()}
 
     def _array(self, ctx: moderngl.Context, name: str) -> moderngl.VertexArray:
-        layout = [(self._corners, "2f", "corner"), (self._spans.buffer, "4f/i", "span")]
-        return ctx.vertex_array(load_program(ctx, "colormap.vert", f"{name}.frag"), layout)
+        program = load_program(ctx, "colormap_tile.vert", f"colormap_{name}.frag")
+        layout = []
+        for records, sizes in ((self._rows, ROW_ATTRIBUTES), (self._places, PLACE_ATTRIBUTES)):
+            taken = [each for each in sizes if each in program]
+            formats = [f"{size}f" if each in program else f"{4 * size}x" for each, size in sizes.items()]
+            layout += [(records.buffer, " ".join(formats), *taken)] if taken else []
+        return ctx.vertex_array(program, layout)
 
     def write(
         self,
@@ -107,62 +131,103 @@ class ColormapPass:
         With `normals_for`, a viewer's (3, 3) rotation from world to view, the entries are that viewer's normals as
         n / 2 + 1/2 instead of light.
         """
-        order = np.argsort(rows["row"])
-        rows = rows[order]
-        # Neighbouring rows are one rectangle: a rasteriser that works on blocks of pixels wastes most of a thin one.
-        runs = np.split(np.arange(len(rows)), np.flatnonzero(np.diff(rows["row"]) != 1) + 1)
-        self._upload(self._rows, rows, rows["row"], runs)
-        if surroundings is not None:
-            self._upload(self._places, surroundings.places[order], rows["row"], runs)
-        ends = [(rows["row"][run[0]], rows["row"][run[-1]] + 1) for run in runs]
-        self._target.use()
-        set_state()
-        folded = bool(rows["albedo"][:, 3].all())
-        for half in (0,) if folded else (0, 256):
-            spans = [((half, first), (half + CODE_COUNT, end)) for first, end in ends]
-            self._spans.write(np.array(spans, SPAN_DTYPE))
-            name = _program_name(surroundings, half == 0, half > 0 or folded)
-            array = self._ready(name, lights, normals_for, surroundings)
-            array.render(moderngl.TRIANGLE_STRIP, instances=len(spans))
+        folded = rows["albedo"][:, 3] > 0
+        if normals_for is not None:
+            rows, folded = rows.copy(), np.zeros(len(rows), bool)
+            rows["albedo"][:, 3] = 0
+        self._rows.write(rows)
+        self._places.write(np.zeros(len(rows), PLACE_DTYPE) if surroundings is None else surroundings.places)
+        self._normals.use(0)
+        if not folded.all():
+            self._begin(self._target, rows[~folded])
+            for name, light in self._lights(rows, lights, normals_for, surroundings):
+                self._draw(name, len(rows), folded=False, parts_drawn=2, **light)
+        if folded.any():
+            self._write_folded(rows, rows[folded], lights, surroundings)
 
-    def _upload(
-        self,
-        texture: moderngl.Texture,
-        records: NDArray[np.void],
-        numbers: NDArray[np.float32],
-        runs: list[NDArray[np.intp]],
+    def _write_folded(
+        self, rows: NDArray[np.void], folded: NDArray[np.void], lights: LightTable, surroundings: Surroundings | None
     ) -> None:
-        for run in runs:
-            place = (0, int(numbers[run[0]]), texture.width, len(run))
-            texture.write(records[run[0] : run[-1] + 1].tobytes(), viewport=place)
+        """Fill those of some rows that have one albedo, which are also given alone."""
+        if surroundings is None:
+            self._begin(self._target, folded, add=False)
+            lights.bind(self._arrays["finished"].program, 1)
+            self._draw("finished", len(rows), folded=True, parts_drawn=2, parts=(1, 0))
+            return
+        self._begin(self._made_target, folded)
+        for name, light in self._lights(rows, lights, None, surroundings):
+            self._draw(name, len(rows), folded=True, parts_drawn=1, **light)
+        self._begin(self._target, folded, add=False)
+        self._made.use(2)
+        self._draw("srgb", len(rows), folded=True, parts_drawn=2, parts=(1, 1), made=2)
 
-    def _ready(
+    def _begin(self, target: moderngl.Framebuffer, rows: NDArray[np.void], add: bool = True) -> None:
+        """Draw into the tiles of some rows from now on; what is drawn is added, or replaces what is there."""
+        first, last = int(rows["row"].min()) // TILES_ACROSS, int(rows["row"].max()) // TILES_ACROSS
+        target.scissor = 0, TILE * first, target.width, TILE * (last + 1 - first)
+        target.use()
+        if add:
+            clear_color()
+        set_state(blend=(moderngl.ONE, moderngl.ONE) if add else None, points=True)
+
+    def _lights(
         self,
-        name: str,
+        rows: NDArray[np.void],
         lights: LightTable,
         normals_for: NDArray[np.float64] | None,
         surroundings: Surroundings | None,
-    ) -> moderngl.VertexArray:
-        """A program's vertex array; the program has its uniforms and its textures."""
-        program = self._arrays[name].program
-        self._normals.use(0)
-        lights.bind(program, unit=1)
-        self._rows.use(2)
-        set_uniforms(program, byte_to_normal=0, rows=2, row_count=self.ROWS)
-        if name == "colormap":
-            viewer = np.eye(3) if normals_for is None else normals_for
-            set_uniforms(program, show_normals=normals_for is not None, view_from_world=viewer)
-        elif surroundings is not None:
-            surroundings.rooms.bind(program, 3)
-            self._places.use(4)
-            if "places" in program:
-                set_uniforms(program, places=4)
-            if surroundings.points is not None and "points" in program:
-                surroundings.points.use(5)
-                set_uniforms(program, points=5)
-            if surroundings.reflection is not None and "reflection" in program:
-                _set_reflection(program, surroundings.reflection)
-        return self._arrays[name]
+    ) -> Iterator[tuple[str, dict[str, Any]]]:
+        """Programs that add all there is, and their uniforms; `parts` of it multiply the albedo, and are on top."""
+        if normals_for is not None:
+            yield "normals", {"parts": (1, 0), "turn": normals_for}
+            return
+        reflection = None if surroundings is None else surroundings.reflection
+        metal = 0.0 if reflection is None else reflection.metal
+        if metal < 1 and (lights.count or any(lights.ambient)):
+            lights.bind(self._arrays["lights"].program, 1)
+            yield "lights", {"parts": (1 - metal, 0)}
+        if lights.count and rows["gloss"][:, 0].any():
+            lights.bind(self._arrays["gloss"].program, 1)
+            yield "gloss", {"parts": (0, 1)}
+        if surroundings is None:
+            return
+        for number in range(len(surroundings.rooms)):
+            if metal < 1:
+                surroundings.rooms.atlas.texture.use(3)
+                yield "diffuse", {"parts": (1 - metal, 0), **_diffuse(surroundings, number)}
+            if reflection is not None:
+                parts = metal, 1 - metal
+                self._mirrors(reflection)
+                if surroundings.rooms.rooms[number].shape == "far":
+                    yield "far", {"parts": parts, **_mirrored(surroundings, reflection, number), "byte_to_normal": 4}
+                else:
+                    assert surroundings.points is not None
+                    surroundings.points.use(5)
+                    surroundings.rooms.bind(self._arrays["near"].program, 3, first=number)
+                    yield (
+                        "near",
+                        {
+                            "parts": parts,
+                            "points": 5,
+                            **_mirrored(surroundings, reflection, number),
+                            "byte_to_normal": 4,
+                        },
+                    )
+
+    def _mirrors(self, reflection: Reflection) -> None:
+        """Bind normals with the part of the light that a surface mirrors by way of each."""
+        self._fresnel.use(4)
+        if reflection != self._reflection:
+            normals = _padded_normals()
+            normals[:CODE_COUNT, 3] = reflection.fresnel(normals[:CODE_COUNT, 2])
+            self._fresnel.write(normals.tobytes())
+            self._reflection = reflection
+
+    def _draw(self, name: str, count: int, **uniforms: Any) -> None:
+        array, wanted = self._arrays[name], self._uniforms[name]
+        values = DEFAULTS | {"row_count": self.ROWS} | uniforms
+        set_uniforms(array.program, **{key: value for key, value in values.items() if key in wanted})
+        array.render(moderngl.POINTS, vertices=count, instances=2 - uniforms["folded"])
 
     def release(self) -> None:
         """Free everything this pass made."""
@@ -174,13 +239,44 @@ class ColormapPass:
         for resource in (
             self._rows,
             self._places,
-            self._spans,
-            self._corners,
             self._target,
+            self._made_target,
             self.texture,
+            self._made,
             self._normals,
+            self._fresnel,
         ):
             resource.release()
+
+
+def tile_origins(rows: ArrayLike) -> NDArray[np.intp]:
+    """The first texel (..., 2) of each colormap row's first tile in `ColormapPass.texture`; the second is beside it."""
+    numbers = np.asarray(rows, np.intp)
+    return TILE * np.stack([2 * (numbers % TILES_ACROSS), numbers // TILES_ACROSS], axis=-1)
+
+
+def _diffuse(surroundings: Surroundings, number: int) -> dict[str, Any]:
+    """The uniforms of the diffuse light of one of the rooms."""
+    table = surroundings.rooms
+    room, level = table.rooms[number], table.atlas.diffuse_faces(table.place(number))
+    light = {"turn": room.environment_from_world, "environments": 3, "level": level}
+    return light | _shares(table, number, "of_weights", room.exposure)
+
+
+def _mirrored(surroundings: Surroundings, reflection: Reflection, number: int) -> dict[str, Any]:
+    """The uniforms of what is mirrored of one of the rooms, whose texture is bound then."""
+    table = surroundings.rooms
+    room = table.rooms[number]
+    light = {"environments": 3, "level": table.mirrored.use(room.environment, reflection.roughness, 3)}
+    if room.shape == "far":
+        return light | {"turn": room.environment_from_world} | _shares(table, number, "of_chosen", room.exposure)
+    matrix = room.room_from_world
+    return light | {"turn": matrix[:3, :3], "shift": matrix[:3, 3]} | _shares(table, number, "of_chosen", 1.0)
+
+
+def _shares(table: RoomTable, number: int, among: str, exposure: float) -> dict[str, Any]:
+    """One room alone has all rows; others have what the rows say."""
+    return {"of_all": exposure} if len(table) == 1 else {"of_all": 0, among: exposure * np.eye(MAX_ROOMS)[number]}
 
 
 class RelightPass:
@@ -235,21 +331,8 @@ class RelightPass:
 
 
 def _padded_normals() -> NDArray[np.float32]:
-    return np.pad(BYTE_TO_NORMAL, ((0, 0), (0, 1))).astype(np.float32)
-
-
-def _program_name(surroundings: Surroundings | None, multiplies: bool, adds: bool) -> str:
-    """The cheapest program for entries that multiply the albedo, or are added, or both."""
-    if surroundings is None:
-        return "colormap"
-    metal = None if surroundings.reflection is None else surroundings.reflection.metal
-    mirrored = metal is not None and ((multiplies and metal > 0) or (adds and metal < 1))
-    if not (multiplies or mirrored):
-        return "colormap"
-    return f"colormap_room{'s' * (len(surroundings.rooms) > 1)}{'_mirrored' * mirrored}"
-
-
-def _set_reflection(program: moderngl.Program, reflection: Reflection) -> None:
-    roughness = max(reflection.roughness, SHARPEST)
-    terms = reflection.strength, reflection.least, reflection.exponent, roughness
-    set_uniforms(program, reflection=terms, metal=reflection.metal, any_power=int(reflection.exponent not in (4, 5)))
+    """Normals of all codes, (256, 4), with 1 for those that are some, and some normal for the others."""
+    normals = np.zeros((256, 4), np.float32)
+    normals[:CODE_COUNT, :3], normals[:CODE_COUNT, 3] = BYTE_TO_NORMAL[:CODE_COUNT], 1
+    normals[CODE_COUNT:, 2] = 1
+    return normals

@@ -134,6 +134,12 @@ def reduced(faces: NDArray[np.floating], size: int) -> tuple[NDArray[np.float64]
     return light, toward / np.linalg.norm(toward, axis=-1, keepdims=True)
 
 
+def halved(faces: NDArray[np.floating]) -> NDArray[np.floating]:
+    """A cube map of half the size, (6, N / 2, N / 2, C): every texel is the mean of four."""
+    size = faces.shape[1] // 2
+    return faces.reshape(6, size, 2, size, 2, -1).mean(axis=(2, 4), dtype=faces.dtype)
+
+
 def _block_sums(image: NDArray[np.floating], many: int) -> NDArray[np.floating]:
     """Of (N, N, C) over squares of `many` texels a side."""
     size = image.shape[0] // many

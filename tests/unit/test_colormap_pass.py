@@ -14,7 +14,7 @@ from runtime.environments import RoomTable
 from runtime.fan_textures import FanTextures
 from runtime.gl_state import preserved_state
 from runtime.lights import LightTable
-from runtime.relight import PLACE_DTYPE, ROW_DTYPE, ColormapPass, Surroundings
+from runtime.relight import PLACE_DTYPE, ROW_DTYPE, ColormapPass, Surroundings, tile_origins
 from tests.solids import BLUE, RED, Box, Sphere, solid_fan
 
 BASES = np.concatenate(
@@ -44,10 +44,13 @@ def table(ctx):
 
 
 def written(ctx, colormaps, table, rows, **options):
-    """The colormap texture (rows, 512, 4) after the rows of a ROW_DTYPE array were written."""
+    """Entries (N, 512, 4) of the rows of a ROW_DTYPE array after they were written."""
     with preserved_state(ctx):
         colormaps.write(rows, table, **options)
-    return np.frombuffer(colormaps.texture.read(), np.float32).reshape(-1, 512, 4)[rows["row"].astype(int)]
+    width, height = colormaps.texture.size
+    texels = np.frombuffer(colormaps.texture.read(), np.float32).reshape(height, width, 4)
+    tiles = [texels[y : y + 16, x : x + 32].reshape(16, 2, 16, 4) for x, y in tile_origins(rows["row"])]
+    return np.stack(tiles).swapaxes(1, 2).reshape(len(rows), 512, 4)
 
 
 def rows_for(bases, gloss, albedo=(1, 1, 1, 0)):
@@ -79,6 +82,28 @@ def test_one_albedo_folds_everything_into_the_first_half(ctx, colormaps, table):
     colors = srgb_from_linear(expected.diffuse * albedo + expected.specular)
     assert np.abs(found[:, :256, :3] - colors).max() < 1e-5
     assert not found[:, 225:256].any()
+
+
+def test_rows_of_either_kind_together_and_no_others(ctx, colormaps, table):
+    lit_by, albedo = lights(2), (0.5, 0.25, 1.0)
+    table.update(lit_by, AMBIENT)
+    rows = rows_for(BASES, Gloss(0.3, 10.0), (*albedo, 0))
+    rows["row"] = np.arange(len(rows)) * 7 + 3
+    written(ctx, colormaps, table, rows)
+    kept, rows = rows[1:2], rows[[0, *range(2, len(rows))]]
+    table.update(lit_by, 0.5)
+    rows["albedo"][::2, 3] = 1
+    before = np.frombuffer(colormaps.texture.read(), np.float32)
+    found = written(ctx, colormaps, table, rows)
+    expected = colormap(rows["basis"], lit_by, 0.5, Gloss(0.3, 10.0))
+    colors = srgb_from_linear(expected.diffuse * albedo + expected.specular)
+    assert np.abs(found[::2, :256, :3] - colors[::2]).max() < 1e-5
+    assert np.abs(found[1::2, :256, :3] - expected.diffuse[1::2]).max() < 1e-5
+    assert np.abs(found[1::2, 256:, :3] - expected.specular[1::2]).max() < 1e-5
+    changed = before != np.frombuffer(colormaps.texture.read(), np.float32)
+    changed = changed.reshape(ColormapPass.ROWS // 2, 16, 2, 32, 4).swapaxes(1, 2).reshape(ColormapPass.ROWS, -1)
+    others = np.setdiff1d(np.arange(ColormapPass.ROWS), rows["row"])
+    assert kept["row"][0] in others and not changed[others].any()
 
 
 def test_a_full_texture_of_rows(ctx, colormaps, table):

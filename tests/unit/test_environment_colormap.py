@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from impostor.environment import Environment, Reflection, Room
-from impostor.environment.colormap import SHARPEST, environment_colormap, surface_points
-from impostor.environment.cube import face_directions
+from impostor.environment.colormap import FINEST, SHARPEST, environment_colormap, mirrored_faces, surface_points
+from impostor.environment.cube import face_directions, sample
 from impostor.lighting import Colormap, DirectionalLight, colormap
 from impostor.normal_code import BYTE_TO_NORMAL
 from impostor.views import basis_facing, direction
@@ -106,6 +106,26 @@ class TestBox:
             one = environment_colormap(basis, place, rooms, Reflection())
             np.testing.assert_allclose(Colormap(*entries).diffuse, one.diffuse, atol=1e-6)
             np.testing.assert_allclose(Colormap(*entries).specular, one.specular, atol=1e-6)
+
+
+class TestMirroredFaces:
+    random = np.random.default_rng(4)
+    waves = Environment("waves", (2 + np.sin(9 * face_directions(64))).astype(np.float32))
+
+    @pytest.mark.parametrize("roughness", [0.0, SHARPEST, 0.25, 1 / 3, 0.8, 1.0])
+    def test_one_look_up_is_what_two_levels_mix(self, roughness):
+        toward = self.random.normal(size=(2000, 3))
+        found = sample(mirrored_faces(self.waves, roughness), toward)
+        np.testing.assert_allclose(found, self.waves.mirrored(toward, max(roughness, SHARPEST)), atol=0.01)
+
+    def test_they_are_no_finer_than_codes_can_show(self):
+        fine = Environment("fine", self.random.random((6, 2 * FINEST, 2 * FINEST, 3), np.float32))
+        faces = mirrored_faces(fine, 0.0)
+        assert faces.shape[1] == FINEST
+        np.testing.assert_allclose(faces.mean(), fine.faces.mean(), rtol=0.01)
+        entries = environment_colormap(np.eye(3), np.zeros(3), [Room.far(fine)], MIRROR).specular[:225]
+        away = 2 * NORMALS[:, 2:] * NORMALS - (0, 0, 1)
+        np.testing.assert_allclose(entries, sample(faces, away), atol=1e-6)
 
 
 @pytest.mark.parametrize("distance", [np.inf, 6.0])

@@ -12,11 +12,15 @@ vec3 on_face(vec3 toward) {
     return vec3(place / abs(longest), (on_x ? 0.0 : on_y ? 2.0 : 4.0) + (side < 0.0 ? 1.0 : 0.0));
 }
 
-vec3 face_texel(vec2 origin, float size, vec3 place) {
+// Of six faces: the middle of the first, half its size, and how far apart they are; parts of the texture's size.
+vec3 texel_of(mat3x2 faces, vec3 place) {
     float row = place.z > 2.5 ? 1.0 : 0.0;
-    vec2 face = vec2(place.z - 3.0 * row, row);
-    vec2 at = origin + face * (size + 2.0) + (place.xy + 1.0) * (0.5 * size) + 1.0;
-    return textureLod(environments, at / vec2(textureSize(environments, 0)), 0.0).rgb;
+    return textureLod(environments, faces[0] + faces[1] * place.xy + faces[2] * vec2(place.z - 3.0 * row, row), 0.0).rgb;
+}
+
+vec3 face_texel(vec2 origin, float size, vec3 place) {
+    vec2 texel = 1.0 / vec2(textureSize(environments, 0));
+    return texel_of(mat3x2(texel * (origin + 0.5 * size + 1.0), texel * 0.5 * size, texel * (size + 2.0)), place);
 }
 
 // How far apart on the cube, whose half side is 1, neighbouring pixels look. Outside of branches only.

@@ -12,8 +12,11 @@ ivec2 texel_here() {
     return clamp(ivec2(gl_FragCoord.xy) + v_shift, v_first, v_last);
 }
 
+// As runtime.relight.ColormapPass lays them out.
 vec4 colormap_entry(float code, int table) {
-    return texelFetch(colormap, ivec2(int(code * 255.0 + 0.5) + 256 * table, v_row), 0);
+    int number = int(code * 255.0 + 0.5);
+    ivec2 tile = ivec2(2 * (v_row & 1) + table, v_row >> 1);
+    return texelFetch(colormap, 16 * tile + ivec2(number & 15, number >> 4), 0);
 }
 
 float depth_at(ivec2 texel) {

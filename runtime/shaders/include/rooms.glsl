@@ -44,12 +44,10 @@ vec3 environment_normal(Room room, vec3 normal) {
     return vec3(dot(room.right.xyz, normal), dot(room.up.xyz, normal), dot(room.back.xyz, normal));
 }
 
-// Where in the environment to look for what a ray in the world meets; any direction for a point outside.
-vec3 direction_toward(Room room, vec3 point, vec3 direction, out bool inside) {
-    vec3 start = in_room(room, point);
+// Where in the environment to look for what a ray in room space meets; any direction for a point outside.
+vec3 local_toward(Room room, vec3 start, vec3 along, out bool inside) {
     inside = within(room, start);
     start = inside ? start : vec3(0.0);
-    vec3 along = normalize(vec3(dot(room.x.xyz, direction), dot(room.y.xyz, direction), dot(room.z.xyz, direction)));
     float half_b = dot(start, along), c = dot(start, start) - 1.0;
     float to_sphere = sqrt(max(half_b * half_b - c, 0.0)) - half_b;
     vec3 sizes = abs(along);
@@ -58,7 +56,14 @@ vec3 direction_toward(Room room, vec3 point, vec3 direction, out bool inside) {
     vec3 met = start + reach * along - room.captured_at.xyz;
     // A camera on the wall itself sees nothing of the point it touches.
     met = largest(abs(met)) > 1e-6 ? met : along;
-    return is_far(room) ? environment_normal(room, direction) : met * room.environment_scale.xyz;
+    return met * room.environment_scale.xyz;
+}
+
+// The same in the world.
+vec3 direction_toward(Room room, vec3 point, vec3 direction, out bool inside) {
+    vec3 along = vec3(dot(room.x.xyz, direction), dot(room.y.xyz, direction), dot(room.z.xyz, direction));
+    vec3 toward = local_toward(room, in_room(room, point), normalize(along), inside);
+    return is_far(room) ? environment_normal(room, direction) : toward;
 }
 
 vec3 diffuse_in(Room room, vec3 normal) {
