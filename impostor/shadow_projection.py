@@ -3,6 +3,10 @@
 Circled positions of figure 8: (1) silhouette pixel and depth, in model space; (2) along the light onto the ground;
 (3) in the plane of the viewer image, through the fan camera nearest to the viewer; (4) on that quad as it is turned
 in the world; (5) from the viewer through it onto the ground. Steps 3 to 5 are linear in homogeneous coordinates.
+
+Steps 3 to 5 make the shadow meet the feet of the picture, which shows the object from the fan camera. The ground
+around it they bend as well: a shadow that is long, seen from much lower or nearer than the fan camera, would point
+another way. So they move the shadow of the feet only; what stands higher casts its own where the light does.
 """
 
 from __future__ import annotations
@@ -20,6 +24,8 @@ from impostor.views import View
 
 LEVEL_CAMERA = 0.05
 """Sine of a camera's elevation over the ground below which it sees the ground as little more than a line."""
+FEET = 0.25
+"""Part of an object's height from which on its shadow lies where the light casts it, wherever its picture stands."""
 LOWEST_LIGHT = 1e-3
 """Sine of the light's lowest elevation over the ground; there a shadow is a thousand times as long as its object."""
 
@@ -206,16 +212,35 @@ def viewer_ground_from_ground(
     Returns
     -------
     ndarray, (4, 4) float64
-        Homogeneous world space to homogeneous world space; the identity but for a factor when the eye is the view's
-        camera and the quad is unturned.
+        Homogeneous world space to homogeneous world space, of w about 1 below the middle of the view; the identity when
+        the eye is the view's camera and the quad is unturned.
 
     Notes
     -----
-    A fan camera that is level with the ground sees it as a line: below `LEVEL_CAMERA` the true shadow stays.
+    A fan camera that is level with the ground sees it as a line: below `LEVEL_CAMERA` the true shadow stays. So it
+    does where the ground below the object is beyond the viewer's horizon.
     """
     if abs(quad_back(view, world_from_model) @ ground.normal) < LEVEL_CAMERA:
         return np.eye(4)
-    return ground_from_sight(eye, ground) @ quad.world_from_plane() @ plane_from_world(view, world_from_model)
+    matrix = ground_from_sight(eye, ground) @ quad.world_from_plane() @ plane_from_world(view, world_from_model)
+    middle = world_from_model[:3, :3] @ view.center + world_from_model[:3, 3]
+    below = middle - (middle @ ground.normal - ground.offset) * ground.normal
+    w = matrix[3, :3] @ below + matrix[3, 3]
+    return matrix / w if w > 0 else np.eye(4)
+
+
+def above_feet(heights: ArrayLike, feet: float) -> NDArray[np.float64]:
+    """How far (N,) shadows of points over the ground have left the place that the feet's has for the true one.
+
+    Parameters
+    ----------
+    heights : array_like, (N,) float
+        Metres.
+    feet : float
+        Metres, `FEET` of the object's height.
+    """
+    part = np.clip(np.asarray(heights, float) / feet, 0, 1)
+    return part * part * (3 - 2 * part)
 
 
 def shadow_on_ground(
@@ -229,6 +254,7 @@ def shadow_on_ground(
     toward_light: ArrayLike,
     eye: ArrayLike,
     ground: Ground,
+    feet: float,
 ) -> NDArray[np.float64]:
     """The shadow's vertices on the ground, lined up with the quad as the viewer sees it.
 
@@ -250,6 +276,8 @@ def shadow_on_ground(
     eye : array_like, (4,) float
         World space: (x, y, z, 1), or (x, y, z, 0) toward an orthographic viewer.
     ground : Ground
+    feet : float
+        Metres in the world; see `above_feet`.
 
     Returns
     -------
@@ -268,4 +296,6 @@ def shadow_on_ground(
     world = model @ world_from_model[:3, :3].T + world_from_model[:3, 3]
     shadow = along_light(world, toward_light, ground)
     matrix = viewer_ground_from_ground(viewer_view, world_from_model, quad, eye, ground)
-    return shadow @ matrix[:, :3].T + matrix[:, 3]
+    at_feet = shadow @ matrix[:, :3].T + matrix[:, 3]
+    part = above_feet(world @ ground.normal - ground.offset, feet)[:, None]
+    return (1 - part) * at_feet + part * np.insert(shadow, 3, 1, axis=1)

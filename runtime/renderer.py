@@ -353,8 +353,7 @@ class ImpostorRenderer(LightSettings):
         if surface is not None:
             check_type("surface", surface, GroundSurface)
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
-            fans = [batch.instances for batch in self._placed.batches]
-            self._shadows.draw(state, fans, self._placed.visible_meshes, viewer, self, ground, surface)
+            self._shadows.draw(state, self._placed.batches, self._placed.visible_meshes, viewer, self, ground, surface)
 
     @contextmanager
     def _frame(self, clip_from_view: ArrayLike, view_from_world: ArrayLike) -> Iterator[tuple[CallerState, Viewer]]:

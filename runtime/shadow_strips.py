@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from impostor.fan import Fan
 from impostor.lighting import DirectionalLight
-from impostor.shadow_projection import LEVEL_CAMERA, Ground, ground_from_sight, strip_points
+from impostor.shadow_projection import FEET, LEVEL_CAMERA, Ground, ground_from_sight, strip_points
 from impostor.strips import silhouette_strips
 from impostor.views import rotation_about_y
 from runtime.gpu import InstanceBuffer, load_program, set_uniforms
@@ -46,15 +46,27 @@ class CastingFan:
     pixels_per_texel: NDArray[np.float64]
 
     @classmethod
-    def of(cls, instances: Instances, viewer: Viewer, ground: Ground) -> CastingFan:
-        """Set up for a viewer."""
+    def of(
+        cls, instances: Instances, viewer: Viewer, ground: Ground, fan_share: NDArray[np.float32] | None = None
+    ) -> CastingFan:
+        """Set up for a viewer; copies that are meshes, by their fan's share (N,), cast where their mesh would."""
         seen = quads_toward(instances, viewer.eye)
         texel = 2 * instances.fan.views.radius.mean() / instances.fan.size * seen.scale
         pixels = texel * viewer.pixels_per_metre(seen.origin)
-        return cls(instances, seen, _records(instances, seen, viewer, ground), pixels)
+        records = _records(instances, seen, viewer, ground)
+        if fan_share is not None:
+            share = fan_share.take(seen.index)[:, None, None]
+            records["rows"] = share * records["rows"] + (1 - share) * np.eye(4, dtype=np.float32)
+        return cls(instances, seen, records, pixels)
 
     def __len__(self) -> int:
         return len(self.seen)
+
+    @property
+    def feet(self) -> float:
+        """Metres of a copy of scale 1; see `shadow_projection.above_feet`."""
+        low, high = self.instances.fan.bounds[:, 1]
+        return FEET * float(high - low)
 
     def corners(self) -> NDArray[np.float64]:
         """World-space corners (N, 8, 3) of the copies' bounding boxes."""
@@ -99,6 +111,7 @@ class StripPass:
     def draw(self, fan: CastingFan, chosen: NDArray[np.intp], light: DirectionalLight, ground: Ground) -> None:
         """Draw the strips of some copies, one draw call for all that show the light the same view."""
         keys = _strip_keys(fan, chosen, np.array(light.toward), ground, LARGEST_TEXEL)
+        set_uniforms(self._program, feet=fan.feet)
         self._draw_each(fan.instances.fan, keys, fan.records[chosen], soft=False)
 
     def draw_soft(
@@ -124,6 +137,7 @@ class StripPass:
                     record[name] = fan.records[name][copies]
                 record["toward_light"], record["step"], record["points"] = toward, step, bits
                 records.append(record)
+        set_uniforms(self._soft_program, feet=fan.feet)
         self._draw_each(fan.instances.fan, np.concatenate(keys), np.concatenate(records), soft=True)
 
     def _draw_each(self, fan: Fan, keys: NDArray[np.intp], records: NDArray[np.void], soft: bool) -> None:
@@ -248,6 +262,11 @@ def _records(instances: Instances, seen: Quads, viewer: Viewer, ground: Ground) 
     world_from_plane[:, :3] = np.stack([right, up, seen.center], axis=-1)
     world_from_plane[:, 3, 2] = 1
     level = np.abs(seen.basis[:, 2] @ ground.normal) < LEVEL_CAMERA
-    casters["rows"] = ground_from_sight(viewer.eye, ground) @ world_from_plane @ plane_from_world
-    casters["rows"][level] = np.eye(4)
+    rows = ground_from_sight(viewer.eye, ground) @ world_from_plane @ plane_from_world
+    below = seen.origin - (seen.origin @ ground.normal - ground.offset)[:, None] * ground.normal
+    w = np.einsum("ni,ni->n", rows[:, 3, :3], below) + rows[:, 3, 3]
+    beyond = w <= 0
+    rows /= np.where(beyond, 1, w)[:, None, None]
+    rows[level | beyond] = np.eye(4)
+    casters["rows"] = rows
     return casters

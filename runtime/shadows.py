@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 from impostor.fan import Fan
 from impostor.lighting import DirectionalLight
 from impostor.shadow_projection import Ground
+from runtime.batch import Batch
 from runtime.contact_shadows import ContactPass, ContactShadows
 from runtime.gl_state import CallerState, clear_color, set_state
 from runtime.gpu import InstanceBuffer, check_texture_size, load_program, set_uniforms
 from runtime.ground_light import BrightLights, ground_light
 from runtime.grounds import GroundSurface, metres_from_screen
-from runtime.instances import Instances, Viewer
+from runtime.instances import Viewer
 from runtime.light_settings import LightSettings
 from runtime.meshes import MeshCopies, MeshInstance
 from runtime.relight import CORNERS
@@ -45,9 +46,14 @@ class _Group(NamedTuple):
     draws: StripPass | MeshShadowPass
     copies: Any
     corners: NDArray[np.float64]
-    clip_from_shadow: NDArray[np.float64]
+    clip_from_shadow: tuple[NDArray[np.float64], ...]
+    """From the true shadow: to where it may be seen."""
     triangles: int
     """Of one copy; 0 where they do not count."""
+
+    def hulls(self, light: DirectionalLight, ground: Ground) -> NDArray[np.float64]:
+        """`shadow_hulls` of the copies."""
+        return np.concatenate([shadow_hulls(self.corners, each, light, ground) for each in self.clip_from_shadow], 1)
 
 
 class _Mark(NamedTuple):
@@ -91,7 +97,7 @@ class ShadowPass:
     def draw(
         self,
         state: CallerState,
-        fans: Sequence[Instances],
+        fans: Sequence[Batch],
         meshes: Sequence[MeshInstance],
         viewer: Viewer,
         settings: LightSettings,
@@ -115,7 +121,9 @@ class ShadowPass:
         frame = _frame_key(fans, meshes, viewer, marks, ground)
         if frame != self._frame:
             self._frame = None
-            casters = [CastingFan.of(instances, viewer, ground) for instances in fans]
+            casters = [
+                CastingFan.of(fan.instances, viewer, ground, fan.levels and fan.levels.fan_share) for fan in fans
+            ]
             groups = self._groups(casters, MeshCopies.gathered(meshes), viewer)
             for batch in batches:
                 self._mark(groups, viewer, batch, ground)
@@ -136,9 +144,13 @@ class ShadowPass:
     def _groups(self, fans: Sequence[CastingFan], meshes: Sequence[MeshCopies], viewer: Viewer) -> list[_Group]:
         clip = viewer.clip_from_world
         return [
-            *(_Group(self._strips, fan, fan.corners(), clip @ fan.records["rows"].astype(float), 0) for fan in fans),
+            # The shadow of a fan lies between where it meets the picture's feet and where the light casts it.
             *(
-                _Group(self._meshes, mesh, mesh_corners(mesh), clip[None], mesh.buffers.triangle_count)
+                _Group(self._strips, fan, fan.corners(), (clip @ fan.records["rows"].astype(float), clip[None]), 0)
+                for fan in fans
+            ),
+            *(
+                _Group(self._meshes, mesh, mesh_corners(mesh), (clip[None],), mesh.buffers.triangle_count)
                 for mesh in meshes
             ),
         ]
@@ -175,7 +187,7 @@ class ShadowPass:
         """Draw shadows into the bound channel; gives their hulls."""
         hulls = []
         for group in groups:
-            hull = shadow_hulls(group.corners, group.clip_from_shadow, light, ground)
+            hull = group.hulls(light, ground)
             chosen = np.flatnonzero(in_view(hull))
             if len(chosen):
                 group.draws.draw(group.copies, chosen, light, ground)
@@ -195,10 +207,7 @@ class ShadowPass:
         light, casting = mark.source, []
         assert isinstance(light, DirectionalLight)
         for group in groups:
-            rim = [
-                shadow_hulls(group.corners, group.clip_from_shadow, edge, ground) for edge in source_rim(light, ground)
-            ]
-            hull = np.concatenate(rim, axis=1)
+            hull = np.concatenate([group.hulls(edge, ground) for edge in source_rim(light, ground)], axis=1)
             chosen = np.flatnonzero(in_view(hull))
             if len(chosen):
                 penumbra = penumbra_pixels(group.corners[chosen], light, ground, viewer)
@@ -330,7 +339,7 @@ def _fading(viewer: Viewer, ground: Ground, surface: GroundSurface | None) -> di
 
 
 def _frame_key(
-    fans: Sequence[Instances],
+    fans: Sequence[Batch],
     meshes: Sequence[MeshInstance],
     viewer: Viewer,
     marks: Sequence[_Mark],
@@ -341,6 +350,6 @@ def _frame_key(
         viewer.key,
         tuple(mark.key for mark in marks),
         ground.plane.tobytes(),
-        *(instances.key for instances in fans),
+        *((*fan.instances.key, fan.levels and fan.levels.key) for fan in fans),
         *((id(mesh.buffers), np.asarray(mesh.world_from_model, float).tobytes()) for mesh in meshes),
     )

@@ -17,8 +17,10 @@ out float v_step;
 void main() {
     vec3 world = placed(point, position_scale, turn);
     vec4 p = vec4(on_ground(world, ground, toward_light), 1.0);
-    vec4 seen = vec4(dot(row0, p), dot(row1, p), dot(row2, p), dot(row3, p));
+    float height = dot(ground, vec4(world, 1.0));
+    vec4 at_feet = vec4(dot(row0, p), dot(row1, p), dot(row2, p), dot(row3, p));
+    vec4 seen = mix(at_feet, p, above_feet(height, position_scale.w));
     gl_Position = clip_from_world * seen;
     v_points = points;
-    v_step = step_between(step_at_metre, dot(ground, vec4(world, 1.0)), gl_Position.w / seen.w);
+    v_step = step_between(step_at_metre, height, gl_Position.w / seen.w);
 }

