@@ -114,6 +114,18 @@ def room_day(studio: Studio) -> Image.Image:
     return captioned([pictures[:2], pictures[2:]], [captions[:2], captions[2:]])
 
 
+def room_sky(studio: Studio) -> Image.Image:
+    """One scene through a day: the sun goes, and the clear sky with it."""
+    walk = Walk(studio.ctx, ready_scene(SAMPLES.parent / "scenes" / "day.toml"), (700, 394), 4)
+    pictures, captions = [], ("at 7", "at noon", "at 18:30", "at 20")
+    for hours in (0.0, 5.0, 6.5, 1.5):
+        walk.sun.turn_clock(hours)
+        walk.draw()
+        pictures.append(Image.fromarray(walk.picture()))
+    walk.release()
+    return captioned([pictures[:2], pictures[2:]], [captions[:2], captions[2:]])
+
+
 def room_study(studio: Studio) -> Image.Image:
     """The scene of the study: a statue of gold and a polished knot in a room."""
     walk = Walk(studio.ctx, ready_scene(SAMPLES.parent / "scenes" / "study.toml"), (1000, 500), 4)

@@ -19,7 +19,7 @@ from PIL import Image
 
 from docs.figure_layers import figure_3, figure_5a, figure_5b, figure_6b
 from docs.figure_ptm import ptm_direct, ptm_dome, ptm_lights, ptm_normals, ptm_quilt
-from docs.figure_rooms import room_day, room_localised, room_materials, room_shapes, room_study
+from docs.figure_rooms import room_day, room_localised, room_materials, room_shapes, room_sky, room_study
 from docs.figure_scenes import compare, figure_9, figure_10, hero
 from docs.studio import Studio
 from impostor.files.output import atomic_output
@@ -28,7 +28,7 @@ FIGURES: dict[str, Callable[[Studio], Image.Image]] = {
     figure.__name__: figure
     for figure in (figure_3, figure_5a, figure_5b, figure_6b, figure_9, figure_10, hero, compare)
     + (ptm_dome, ptm_direct, ptm_lights, ptm_normals, ptm_quilt)
-    + (room_study, room_localised, room_materials, room_shapes, room_day)
+    + (room_study, room_localised, room_materials, room_shapes, room_day, room_sky)
 }
 FOLDER = Path(__file__).with_name("figures")
 LARGEST = 700_000  # bytes

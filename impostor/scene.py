@@ -171,7 +171,8 @@ class SceneRoom:
     Parameters
     ----------
     environment : Path or None
-        A panorama, or a folder of six faces; None is captured in the scene itself, from the room's middle.
+        A panorama, or a folder of six faces; None is captured in the scene itself, from the room's middle, unless it
+        is the sky.
     shape : {"far", "sphere", "box"}
     size : tuple of float
         Width, height and depth in metres; what is far has none.
@@ -185,6 +186,8 @@ class SceneRoom:
         Multiplies its light.
     visible : bool
         Whether its walls are drawn, or the sky that a far one is.
+    sky : bool
+        The clear sky of the scene's sun, far away: `impostor.sky.sky_of`.
     """
 
     environment: Path | None
@@ -195,6 +198,7 @@ class SceneRoom:
     turn: float = 0.0
     exposure: float = 1.0
     visible: bool = True
+    sky: bool = False
 
     def around(self, environment: Environment, yaw: float) -> Room:
         """The room with what it shows, turned by a yaw in radians."""

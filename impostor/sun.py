@@ -89,11 +89,16 @@ def sun_at(sun: Sun, hours: float) -> Daylight:
     azimuth = float((sun.north - np.arctan2(east, north) + np.pi) % (2 * np.pi) - np.pi)
     level = np.cos(elevation)
     toward = (float(level * np.sin(azimuth)), float(up), float(level * np.cos(azimuth)))
-    degrees = np.degrees(elevation)
     color = np.multiply(sun.color, sunlight(elevation))
     light = DirectionalLight(toward, _triple(color)) if elevation > 0 else None
-    sky = np.array([np.interp(degrees, _SKY[:, 0], _SKY[:, 1 + channel]) for channel in range(3)])
+    sky = sky_color(elevation)
     return Daylight(azimuth, elevation, light, _triple(np.minimum(sky, 1)), _triple(sun.skylight * sky))
+
+
+def sky_color(elevation: float) -> np.ndarray:
+    """Linear colour of the sky, (3,) float64, where the sun has some elevation, radians."""
+    degrees = np.degrees(elevation)
+    return np.array([np.interp(degrees, _SKY[:, 0], _SKY[:, 1 + channel]) for channel in range(3)])
 
 
 def sunlight(elevation: float) -> np.ndarray:
@@ -116,12 +121,16 @@ def sunlight(elevation: float) -> np.ndarray:
 
 
 def lighting_at(scene: Scene, seconds: float = 0.0) -> Lighting:
-    """Lights, ambient light and background of a scene that runs since `seconds`."""
+    """Lights, ambient light and background of a scene that runs since `seconds`.
+
+    Where a room is the sky, the sky's light is that room's.
+    """
     daylight = None if scene.sun is None else sun_at(scene.sun, hours_at(scene.sun, seconds))
     lights, ambient, sky = scene.lights, scene.ambient, (0.0, 0.0, 0.0)
     if daylight is not None:
         lights += () if daylight.light is None else (daylight.light,)
-        ambient = _triple(np.add(ambient, daylight.ambient))
+        if not any(room.sky for room in scene.rooms):
+            ambient = _triple(np.add(ambient, daylight.ambient))
         sky = daylight.sky
     return Lighting(lights, ambient, sky if scene.background is None else scene.background)
 

@@ -12,6 +12,7 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from impostor.environment import Environment
 from impostor.errors import ImpostorError
 from impostor.lighting import DirectionalLight
 from impostor.model import Model
@@ -150,10 +151,14 @@ class Stage:
         ambient: ArrayLike,
         background: tuple[float, float, float],
         room_yaws: Sequence[float] | None = None,
+        sky: Environment | None = None,
     ) -> None:
-        """Set what the scene is lit by; the background is linear, the yaws of its rooms are radians."""
+        """Set what the scene is lit by; the background is linear, the yaws of its rooms are radians.
+
+        `sky` is what its rooms show that are the sky.
+        """
         if room_yaws is not None:
-            self._rooms.turn(room_yaws)
+            self._rooms.turn(room_yaws, sky)
         self._lights, self._ambient = lights, ambient
         red, green, blue = srgb_from_linear(np.asarray(background, float)).tolist()
         self._background = red, green, blue, 1.0

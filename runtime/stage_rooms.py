@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from impostor.environment import Environment, Room
 from impostor.scene import Scene, SceneRoom
+from impostor.sky import sky_of
+from impostor.sun import sun_at
 from impostor.views import rotation_about_y
 from runtime.assets import Assets
 from runtime.room_capture import capture_environment
@@ -40,14 +42,20 @@ class StageRooms:
     def change(self, scene: Scene, environments: list[Environment | None]) -> None:
         """Take over a scene's rooms and what `environments_of` found for them; captured ones come with `capture`."""
         self._described, self._environments = scene.rooms, environments
-        self.turn([room.yaw for room in scene.rooms])
+        azimuth = 0.0 if scene.sun is None else sun_at(scene.sun, scene.sun.time_of_day).azimuth
+        self.turn([azimuth if room.sky else room.yaw for room in scene.rooms])
 
     def __len__(self) -> int:
         return len(self._described)
 
-    def turn(self, yaws: Sequence[float]) -> None:
-        """Turn all rooms by yaws in radians."""
+    def turn(self, yaws: Sequence[float], sky: Environment | None = None) -> None:
+        """Turn all rooms by yaws in radians; those that are the sky show another one from now on, if it is given."""
         self._yaws = tuple(yaws)
+        if sky is not None:
+            skies = [room.sky for room in self._described]
+            self._environments = [
+                sky if is_sky else each for each, is_sky in zip(self._environments, skies, strict=True)
+            ]
         self.all, self.visible = [], []
         for environment, described, yaw in zip(self._environments, self._described, yaws, strict=True):
             if environment is not None:
@@ -95,4 +103,6 @@ def environments_of(scene: Scene, assets: Assets) -> list[Environment | None]:
     ------
     EnvironmentFileError
     """
-    return [None if room.environment is None else assets.environment(room.environment) for room in scene.rooms]
+    maps = [None if room.environment is None else assets.environment(room.environment) for room in scene.rooms]
+    sky = sky_of(scene) if any(room.sky for room in scene.rooms) else None
+    return [sky if room.sky else each for room, each in zip(scene.rooms, maps, strict=True)]

@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from impostor.environment import Environment
 from impostor.lighting import DirectionalLight
-from impostor.scene import Scene
+from impostor.scene import Scene, SceneRoom
+from impostor.sky import sky_of
 from impostor.sun import Daylight, Lighting, lighting_at, sun_at
 from impostor.views import direction
 
@@ -59,11 +61,18 @@ class SunControl:
 
     @property
     def room_yaws(self) -> tuple[float, ...]:
-        """How the scene's rooms are turned, radians."""
-        return tuple(
-            room.yaw + room.turn * self._seconds + (self._dragged if room.shape == "far" else 0.0)
-            for room in self._scene.rooms
-        )
+        """How the scene's rooms are turned, radians; the sky with the sun."""
+        sun = self._now.sun
+        azimuth = 0.0 if sun is None else sun_at(sun, self._hours).azimuth
+        return tuple(azimuth if room.sky else self._yaw(room) for room in self._scene.rooms)
+
+    def _yaw(self, room: SceneRoom) -> float:
+        return room.yaw + room.turn * self._seconds + (self._dragged if room.shape == "far" else 0.0)
+
+    @property
+    def sky(self) -> Environment | None:
+        """What rooms show that are the sky."""
+        return sky_of(self._now) if any(room.sky for room in self._scene.rooms) else None
 
     def step(self, seconds: float) -> None:
         """Let time go on, if it does."""
@@ -102,10 +111,15 @@ class SunControl:
     @property
     def lighting(self) -> Lighting:
         """All light of the scene as it is now."""
+        return lighting_at(self._now)
+
+    @property
+    def _now(self) -> Scene:
+        """The scene, its sun or its lights as they are now."""
         scene = self._scene
         if scene.sun is not None:
-            return lighting_at(replace(scene, sun=replace(scene.sun, time_of_day=self._hours, north=self._north)))
-        return lighting_at(replace(scene, lights=self._lights))
+            return replace(scene, sun=replace(scene.sun, time_of_day=self._hours, north=self._north))
+        return replace(scene, lights=self._lights)
 
     @property
     def words(self) -> str:

@@ -263,7 +263,7 @@ class Walk:
     def draw(self) -> None:
         """Draw the picture, without what lies over it."""
         begun, shown, camera, lighting = time.perf_counter(), self.shown, self.camera, self.sun.lighting
-        self.stage.light(lighting.lights, lighting.ambient, lighting.background, self.sun.room_yaws)
+        self.stage.light(lighting.lights, lighting.ambient, lighting.background, self.sun.room_yaws, self.sun.sky)
         with counted_draw_calls() as calls:
             self.stage.draw(self.canvas, camera, shown.view, shown.shadows, shown.split)
         if shown.view == "depth":

@@ -67,6 +67,8 @@ def bright_lights(source: Room | Environment, count: int) -> list[DirectionalLig
     if count < 1:
         raise SettingsError("bright lights", f"{count} lights; expected at least 1")
     room = source if isinstance(source, Room) else Room.far(source)
+    if not room.environment.sources:
+        return []
     size = room.environment.size
     cells, texels = min(size, CELLS), min(size, FINEST)
     light, toward = (_by_cell(each, cells) for each in reduced(room.environment.faces, texels))

@@ -32,6 +32,8 @@ class Environment:
         Where it comes from; errors and displays show it.
     faces : ndarray, (6, N, N, 3) float32
         Linear radiance in the order and handedness of `cube.FACE_AXES`; N is a power of two. Made read-only.
+    sources : bool
+        Whether to look for bright lights in it; a sky whose sun is a light of its own has none to find.
 
     Raises
     ------
@@ -41,6 +43,7 @@ class Environment:
 
     name: str
     faces: NDArray[np.float32]
+    sources: bool = True
 
     def __post_init__(self):
         faces = np.array(self.faces, np.float32, order="C")
@@ -51,6 +54,19 @@ class Environment:
             raise SettingsError(self.name, "radiance that is negative or not finite; expected numbers of at least 0")
         faces.flags.writeable = False
         object.__setattr__(self, "faces", faces)
+
+    @classmethod
+    def between(cls, name: str, first: Environment, second: Environment, share: float) -> Environment:
+        """A mix of two environments of one size, `share` of it the second.
+
+        It is convolved already: a convolution of a mix is the mix of convolutions.
+        """
+        made = cls(name, _mix(first.faces, second.faces, share), first.sources or second.sources)
+        # Where a cached property keeps what it has worked out.
+        made.__dict__["diffuse"] = _mix(first.diffuse, second.diffuse, share)
+        levels = zip(first.levels[1:], second.levels[1:], strict=True)
+        made.__dict__["levels"] = made.faces, *(_mix(*each, share) for each in levels)
+        return made
 
     @property
     def size(self) -> int:
@@ -105,3 +121,7 @@ class Environment:
     @cached_property
     def _padded_levels(self) -> tuple[NDArray[np.float32], ...]:
         return self._padded, *(padded(level) for level in self.levels[1:])
+
+
+def _mix(first: NDArray[np.float32], second: NDArray[np.float32], share: float) -> NDArray[np.float32]:
+    return (first * (1 - share) + second * share).astype(np.float32)

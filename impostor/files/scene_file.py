@@ -96,7 +96,7 @@ class _Reader:
             self._scatter(table, ("scatter", index))
         meshes = tuple(self._mesh(table, ("mesh", index)) for index, table in enumerate(values["mesh"]))
         surfaces = tuple(map(self._surface, values["surface"]))
-        rooms = tuple(self._room(table, ("room", index)) for index, table in enumerate(values["room"]))
+        rooms = tuple(self._room(table, ("room", index), sun) for index, table in enumerate(values["room"]))
         ambient = values["ambient"] or ((0.0, 0.0, 0.0) if sun or rooms else DEFAULT_AMBIENT)
         return Scene(
             self.document.path,
@@ -302,7 +302,7 @@ class _Reader:
             Gloss(table["gloss"], table["shininess"]),
         )
 
-    def _room(self, table: Table, place: Place) -> SceneRoom:
+    def _room(self, table: Table, place: Place, sun: Table | None) -> SceneRoom:
         self._note("rooms", table["environment"])
         shape, wanted = table["shape"], {"far": None, "sphere": "radius", "box": "size"}[table["shape"]]
         for name in ("size", "radius"):
@@ -310,8 +310,15 @@ class _Reader:
                 expected = f"one with {shape!r}" if name == wanted else f"none with {shape!r}"
                 raise self.document.error((*place, name), expected)
         width, height, depth = table["size"] or [2 * (table["radius"] or 1.0)] * 3
-        if shape == "far" and table["environment"] is None:
-            raise self.document.error((*place, "environment"), "one with 'far'")
+        if table["sky"]:
+            if shape != "far":
+                raise self.document.error((*place, "sky"), "it of a room that is far only", f"it with {shape!r}")
+            if table["environment"] is not None:
+                raise self.document.error((*place, "environment"), "none with sky = true")
+            if sun is None:
+                raise self.document.error((*place, "sky"), "a [sun] in the scene", "none")
+        elif shape == "far" and table["environment"] is None:
+            raise self.document.error((*place, "environment"), "one with 'far', or sky = true")
         return SceneRoom(
             table["environment"],
             shape,
@@ -321,6 +328,7 @@ class _Reader:
             math.radians(table["turn_deg"]),
             table["exposure"],
             table["visible"],
+            table["sky"],
         )
 
     def _warn(self, place: Place, problem: str) -> None:

@@ -296,6 +296,7 @@ GROUND = {
 }
 ROOM = {
     "environment": Key(MapName(MAP_SUFFIXES)),
+    "sky": Key(Flag(), False),
     "shape": Key(Choice(SHAPES), "far"),
     "size": Key(Numbers(3, _LENGTH), None, "m"),
     "radius": Key(_LENGTH, None, "m"),

@@ -320,4 +320,4 @@ def test_the_shipped_scenes_load(path, tmp_path):
 
 
 def test_scenes_are_shipped():
-    assert {path.stem for path in SCENES} == {"forest", "square", "close", "study", "meadow"}
+    assert {path.stem for path in SCENES} == {"forest", "square", "close", "study", "meadow", "day"}

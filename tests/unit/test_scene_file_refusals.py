@@ -40,6 +40,13 @@ def folder(tmp_path):
         (f"{CAMERA}fov = 3", 4, "camera.fov: unknown key; expected 'fov_deg'"),
         (f"{CAMERA}[[room]]", 4, "room[0].environment: is missing; expected one with 'far'"),
         (f"{CAMERA}[[room]]\nenvironment = 'a.jpg'", 5, "room[0].environment: 'a.jpg'; expected a file there"),
+        (f"{CAMERA}[[room]]\nsky = true", 5, "room[0].sky: none; expected a [sun] in the scene"),
+        (
+            f"{CAMERA}[sun]\n[[room]]\nsky = true\nenvironment = 'a.hdr'",
+            7,
+            "room[0].environment: 'a.hdr'; expected none with",
+        ),
+        (f"{CAMERA}[sun]\n[[room]]\nsky = true\nshape = 'sphere'\nradius = 1", 6, "room[0].sky: it with 'sphere'"),
         (f"{CAMERA}[[room]]\nenvironment = ''", 5, "room[0].environment: ''; expected the path of a .hdr or .exr file"),
         (f"{CAMERA}[[room]]\nshape = 'box'", 4, "room[0].size: is missing; expected one with 'box'"),
         (f"{CAMERA}[[room]]\nshape = 'sphere'\nradius = 1\nsize = [1, 1, 1]", 7, "room[0].size: [1, 1, 1]; expected"),

@@ -88,6 +88,14 @@ def test_a_room_turns_with_what_it_lights(see):
     assert turned[right_side][..., 2].mean() > turned[right_side][..., 0].mean() + 30
 
 
+def test_the_sky_stands_where_the_sun_does(see):
+    """In the evening, with the sun in the north-west: a viewer who looks north has it on the left."""
+    sun = "[sun]\ntime_of_day = {}\nday_of_year = 172\nlatitude_deg = 60\nnorth_deg = 180\n"
+    evening, morning = (see(sun.format(hours) + "[[room]]\nsky = true\n")[:20].mean(axis=(0, 2)) for hours in (21, 3))
+    assert evening[:8].mean() > 1.2 * evening[-8:].mean()
+    assert morning[-8:].mean() > 1.2 * morning[:8].mean()
+
+
 def test_a_mirror_shows_the_side_that_it_faces(see):
     """A mirror turned to the right of the viewer shows red from +X."""
     mirror = "reflection = { least = 1, metal = 1 }"
