@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from runtime.dither import divided, part_of
 from runtime.fan_textures import FanTextures
 from runtime.instances import Instances, Quads, Viewer, quads_toward
 from runtime.lod import Levels
@@ -64,23 +65,18 @@ class Batch:
         return quads if shares.all() else quads.take(shares != 0)
 
     def shown_to(self, viewer: Viewer, seconds: float | None, fade_seconds: float) -> Shown:
-        """What a viewer is shown, so many seconds after the last frame; None is a look from elsewhere in between."""
+        """What a viewer is shown, so many seconds after the last frame; None is one more look at the same frame."""
         quads = self.seen_by(viewer)
-        shares, slots = self._shares_of(quads), quads.index
+        slots, parts = quads.index, part_of(self._shares_of(quads))
         if seconds is not None:
-            self.fades.update(quads.index, quads.view, seconds, fade_seconds)
-        # Shares below 0 take their pixels from the other end.
-        parts = np.empty((len(quads), 2), np.float32)
-        parts[:, 0], parts[:, 1] = (1 + shares) * (shares < 0), np.where(shares < 0, 1, shares)
-        if seconds is None or not self.fades.fading:
+            self.fades.update(slots, quads.view, seconds, fade_seconds)
+        share = self.fades.shares(slots, quads.view)
+        fading = np.flatnonzero(share < 1)
+        if not len(fading):
             return Shown(quads, slots, parts)
-        part = self.fades.share.take(slots)
-        fading = np.flatnonzero(part < 1)
-        between = parts[fading, 0] + part[fading] * (parts[fading, 1] - parts[fading, 0])
-        leaving = parts[fading]
-        leaving[:, 0] = parts[fading, 1] = between
         copies = slots[fading]
-        view = np.concatenate([self.fades.shown.take(slots), self.fades.leaving.take(copies)])
+        parts[fading], leaving = divided(parts[fading], share[fading])
+        view = np.concatenate([quads.view, self.fades.leaving.take(copies)])
         quads = Quads(quads.placement, np.concatenate([slots, copies]), view)
         return Shown(quads, np.concatenate([slots, copies + len(self.instances)]), np.concatenate([parts, leaving]))
 

@@ -18,7 +18,7 @@ from impostor.model import Model
 from impostor.ptm.quantise import Ptm
 from impostor.shadow_projection import Ground
 from runtime.bump import Bump
-from runtime.checks import check_type, invertible
+from runtime.checks import check_number, check_type, invertible
 from runtime.environments import RoomTable, check_rooms
 from runtime.gl_state import CallerState, preserved_state
 from runtime.grounds import GroundPass, GroundSurface, check_surface
@@ -63,6 +63,9 @@ class ImpostorRenderer(LightSettings):
         How many of the brightest lights of each room cast shadows; 0 for none.
     contact_shadows : ContactShadows or None
         Whether `draw_shadows` also darkens the ground around the feet of what stands on it, and how.
+    view_fade_seconds : float
+        The longest that a copy takes from one view of its fan to the next, its pixels dealt out between the two; 0
+        switches at once, as does a renderer that is not told the time. See `advance`.
 
     Examples
     --------
@@ -207,8 +210,8 @@ class ImpostorRenderer(LightSettings):
 
         The next `draw` chooses the levels of detail for its viewer and carries crossfades on by so much; more draws of
         the same frame, for mirrors or other viewports, show the same levels. In a renderer that is never told the time
-        every draw chooses for itself, and levels change at once. Infinitely many seconds end all crossfades, as after
-        a cut to another camera.
+        every draw chooses for itself, and levels and views change at once. Infinitely many seconds end all crossfades,
+        as after a cut to another camera.
 
         Parameters
         ----------
@@ -378,6 +381,15 @@ class ImpostorRenderer(LightSettings):
         else:
             self._table.update(self.lights, self.ambient, self._rooms)
         self._room_table.update(self._rooms)
+
+    @property
+    def view_fade_seconds(self) -> float:
+        return self._impostors.view_fade_seconds
+
+    @view_fade_seconds.setter
+    def view_fade_seconds(self, seconds: float) -> None:
+        check_number("view_fade_seconds", "time", seconds, 0, 1e9)
+        self._impostors.view_fade_seconds = float(seconds)
 
     @property
     def statistics(self) -> dict[str, int]:
