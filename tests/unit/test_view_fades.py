@@ -166,9 +166,8 @@ class TestPicture:
         renderer.add(FAN)
         before, after = both(renderer, seen)
         seen(SECOND, 0.05)
-        seen(FIRST, 0.0)
-        for _ in range(10):
-            seen(FIRST, 0.05)
+        for seconds in (0.0, 0.05, 0.001, 0.05, 0.05):
+            seen(FIRST, seconds)
         found = seen(SECOND, VIEW_FADE_SECONDS / 2)
         np.testing.assert_array_equal(found, np.where((ranks() < 0.5)[..., None], after, before))
 
