@@ -76,8 +76,12 @@ def check_type(where: str, value: object, kind: type, origin: str = "") -> None:
     SettingsError
     """
     if not isinstance(value, kind):
-        article = "an" if kind.__name__[0] in "AEIOUaeiou" else "a"
-        raise SettingsError(where, f"a {type(value).__name__}; expected {article} {kind.__name__}{origin}")
+        raise SettingsError(where, f"a {type(value).__name__}; expected {with_article(kind)}{origin}")
+
+
+def with_article(kind: type) -> str:
+    """The name of a type after "a" or "an"."""
+    return f"{'an' if kind.__name__[0] in 'AEIOUaeiou' else 'a'} {kind.__name__}"
 
 
 def _fits(found: tuple[int, ...], wanted: tuple[int, ...]) -> bool:

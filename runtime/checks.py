@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from impostor.checks import check_number, check_type, numbers
+from impostor.checks import check_number, check_type, numbers, with_article
 from impostor.errors import SettingsError
 
-__all__ = ["check_number", "check_type", "invertible", "numbers"]
+__all__ = ["check_number", "check_type", "invertible", "numbers", "with_article"]
 
 
 def invertible(where: str, name: str, matrix: ArrayLike | None) -> NDArray[np.float64]:

@@ -17,8 +17,9 @@ from impostor.lighting import Gloss
 from impostor.model import Model
 from impostor.ptm.quantise import Ptm
 from impostor.shadow_projection import Ground
+from runtime.animation import AnimatedInstances
 from runtime.bump import Bump
-from runtime.checks import check_number, check_type, invertible
+from runtime.checks import check_number, check_type, invertible, with_article
 from runtime.environments import RoomTable, check_rooms
 from runtime.gl_state import CallerState, preserved_state
 from runtime.grounds import GroundPass, GroundSurface, check_surface
@@ -196,14 +197,26 @@ class ImpostorRenderer(LightSettings):
         self._surfaces.append(surface)
         return surface
 
-    def remove(self, placed: Instances | MeshInstance | Surface) -> None:
-        """Take copies, a mesh or a surface away again; what is on the GPU goes with the last that needs it."""
-        if any(surface is placed for surface in self._surfaces):
-            self._surfaces = [surface for surface in self._surfaces if surface is not placed]
+    def remove(self, placed: Instances | MeshInstance | Surface | AnimatedInstances) -> None:
+        """Take something away again; what is on the GPU goes with the last that needs it.
+
+        Raises
+        ------
+        SettingsError
+            What is not in this renderer, or not any more.
+        """
+        self._check_in_use()
+        parts = placed.poses if isinstance(placed, AnimatedInstances) else (placed,)
+        for part in parts:
+            if not self._placed.holds(part) and not any(surface is part for surface in self._surfaces):
+                expected = "something that was added to this renderer and not taken away since"
+                raise SettingsError("remove", f"{with_article(type(placed))}; expected {expected}")
+        with preserved_state(self._ctx):
+            self._surfaces = [surface for surface in self._surfaces if all(surface is not part for part in parts)]
             self._surface_pass.prepare(self._surfaces)
-        for fan in self._placed.remove(placed):
-            self._impostors.forget()
-            self._shadows.forget(fan)
+            for fan in (fan for part in parts for fan in self._placed.remove(part)):
+                self._impostors.forget()
+                self._shadows.forget(fan)
 
     def advance(self, seconds: float) -> None:
         """Tell the time that has passed since the last frame, once a frame, before it is drawn.
