@@ -13,7 +13,7 @@ from impostor.environment.reflection import Reflection
 from impostor.lighting import Gloss
 from impostor.model import Material, Model, Primitive
 from runtime.bump import Bump, bump_texture, with_tangents
-from runtime.checks import check_type, numbers
+from runtime.checks import LARGEST, bounded, check_type
 from runtime.dither import WHOLE
 from runtime.environments import RoomTable
 from runtime.gl_state import CallerState, set_state
@@ -153,7 +153,7 @@ class MeshInstance:
 
 
 def check_meshes(meshes: Sequence[MeshInstance]) -> None:
-    """Refuse a `world_from_model` that has become no finite (4, 4) matrix, and a `reflection` that is none.
+    """Refuse a `world_from_model` that has become none that can be drawn, and a `reflection` that is none.
 
     Raises
     ------
@@ -163,9 +163,9 @@ def check_meshes(meshes: Sequence[MeshInstance]) -> None:
         matrices = np.array([mesh.world_from_model for mesh in meshes], float)
     except (TypeError, ValueError):
         matrices = np.empty(0)
-    if len(meshes) and (matrices.shape != (len(meshes), 4, 4) or not np.isfinite(matrices).all()):
+    if len(meshes) and (matrices.shape != (len(meshes), 4, 4) or not (np.abs(matrices) < LARGEST).all()):
         for mesh in meshes:
-            numbers(mesh.buffers.model.name, "world_from_model", mesh.world_from_model, (4, 4))
+            bounded(mesh.buffers.model.name, "world_from_model", mesh.world_from_model, (4, 4))
     for mesh in meshes:
         if mesh.reflection is not None:
             check_type("reflection", mesh.reflection, Reflection)

@@ -9,6 +9,7 @@ from impostor.shadow_projection import Ground
 from runtime import ImpostorRenderer
 from runtime.animation import AnimatedFan, AnimatedInstances
 from runtime.cameras import Camera
+from runtime.contact_shadows import ContactShadows
 from runtime.grounds import GroundSurface
 from runtime.surfaces import rectangle
 from tests.ptms import random_ptm
@@ -169,6 +170,21 @@ class TestGround:
             assert problem(caught) == "ground: a tuple; expected a Ground"
         with pytest.raises(SettingsError, match="^surface: a tuple; expected a GroundSurface$"):
             renderer.draw_ground(*MATRICES, LEVEL, (0.5, 0.5, 0.5))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("exponent", [8, 14, 18, 30, 38, 40, 160, 300, 308])
+@pytest.mark.parametrize("name", ["positions", "yaws", "scales"])
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_numbers_of_any_size_are_drawn_or_left_out(renderer, screen, name, exponent, sign):
+    renderer.lights = [SUN]
+    renderer.contact_shadows = ContactShadows(0.5)
+    copies = renderer.add(FAN, [(0, 0, 0), (1, 0, 0)])
+    # A scale below 0 is no copy; one that is next to nothing is a hard one.
+    getattr(copies, name)[0] = 10.0 ** (sign * exponent) if name == "scales" else sign * 10.0**exponent
+    for draw in DRAWS.values():
+        draw(renderer)
+    assert renderer.statistics["instances"] >= 1
 
 
 class TestRemoving:
