@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from numbers import Real
+from numbers import Integral, Real
+from os import PathLike
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,12 +32,15 @@ def numbers(where: str, name: str, values: ArrayLike, *shapes: tuple[int, ...]) 
     SettingsError
         No numbers, another shape, or one that is not finite.
     """
+    given = None
     try:
         given = np.asarray(values)
         # NumPy would read the text "2" as 2.
-        array = None if given.dtype.kind in "SU" else np.asarray(given, float)
+        array = None if given.dtype.kind in "SUc" else np.asarray(given, float)
     except (TypeError, ValueError):
         array = None
+    if given is not None and given.dtype.kind == "c":
+        raise SettingsError(where, f"{name} of complex numbers; expected real ones")
     if array is None:
         found = f"{name} is a {type(values).__name__}"
         raise SettingsError(where, f"{found}; expected numbers of shape {_in_words(shapes)}")
@@ -66,6 +70,31 @@ def check_number(
     number = float(value)
     if not (np.isfinite(number) and low <= number <= high) or (above and number == low):
         raise SettingsError(where, f"{name} {value}; expected {expected}")
+
+
+def check_whole(where: str, value: object, low: int, high: int) -> int:
+    """A whole number from `low` to `high`, as Python's own.
+
+    Raises
+    ------
+    SettingsError
+        Another number, or something else.
+    """
+    if isinstance(value, Integral) and not isinstance(value, bool) and low <= int(value) <= high:
+        return int(value)
+    found = value if isinstance(value, Real) else f"a {type(value).__name__}"
+    raise SettingsError(where, f"{found}; expected a whole number from {low} to {high}")
+
+
+def check_path(path: object) -> None:
+    """Refuse what names no file: Python would take a whole number for one that is open already.
+
+    Raises
+    ------
+    SettingsError
+    """
+    if not isinstance(path, str | PathLike):
+        raise SettingsError("path", f"a {type(path).__name__}; expected a str or a path")
 
 
 def check_type(where: str, value: object, kind: type, origin: str = "") -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from impostor.checks import check_path
 from impostor.errors import ModelError, SettingsError
 from impostor.importing.checks import CHECKS, prepared
 from impostor.importing.gltf_scene import read_gltf
@@ -166,6 +167,7 @@ def load_model(path: str | PathLike[str], *, up: str = "y", allow_missing_textur
     colours of materials are sRGB values. Missing normals are computed: flat for glTF, as its specification asks, else
     smooth up to a crease of 40 degrees (80 in PLY, whose scans are noisy).
     """
+    check_path(path)
     if up not in ("y", "z"):
         raise SettingsError("up", f"'{up}', expected 'y' or 'z'")
     suffix = Path(path).suffix.lower()

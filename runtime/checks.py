@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from impostor.checks import check_number, check_type, numbers, with_article
+from impostor.checks import check_number, check_type, check_whole, numbers, with_article
 from impostor.errors import SettingsError
 
-__all__ = ["bounded", "check_number", "check_type", "invertible", "numbers", "with_article"]
+__all__ = ["bounded", "check_number", "check_type", "check_whole", "invertible", "numbers", "with_article"]
 
 # What lies between has squares and inverses in single precision, in which the GPU counts.
 LARGEST, SMALLEST = 1e15, 1e-15

@@ -19,10 +19,10 @@ from impostor.ptm.quantise import Ptm
 from impostor.shadow_projection import Ground
 from runtime.animation import AnimatedInstances
 from runtime.bump import Bump
-from runtime.checks import check_number, check_type, invertible, with_article
+from runtime.checks import check_number, check_type, check_whole, invertible, with_article
 from runtime.environments import RoomTable, check_rooms
 from runtime.gl_state import CallerState, preserved_state
-from runtime.grounds import GroundPass, GroundSurface, check_surface
+from runtime.grounds import GroundPass, GroundSurface
 from runtime.impostors import ImpostorPass
 from runtime.instances import Instances, Viewer
 from runtime.light_settings import LightSettings
@@ -34,6 +34,7 @@ from runtime.placed import Placed
 from runtime.rooms import RoomPass, number_of, to_show
 from runtime.shadows import ShadowPass
 from runtime.surfaces import Surface, SurfacePass
+from runtime.tiles import TileCache
 
 
 class ImpostorRenderer(LightSettings):
@@ -78,6 +79,8 @@ class ImpostorRenderer(LightSettings):
 
     def __init__(self, ctx: moderngl.Context, cache_side: int = 4096):
         super().__init__()
+        check_type("ctx", ctx, moderngl.Context, " of moderngl")
+        check_whole("cache_side", cache_side, 1, TileCache.largest(ctx))
         self._ctx, self._released = ctx, False
         with preserved_state(ctx):
             self._impostors = ImpostorPass(ctx, cache_side)
@@ -339,7 +342,7 @@ class ImpostorRenderer(LightSettings):
     ) -> None:
         """Draw a plane, lit by lights and rooms, for callers who have no ground of their own."""
         check_type("ground", ground, Ground)
-        check_surface(surface)
+        check_type("surface", surface, GroundSurface)
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
             self._update_lights("lit")
             self._ground_pass.draw(state, viewer, self._table, self._room_table, ground, surface)

@@ -11,6 +11,7 @@ from contextlib import ExitStack, contextmanager
 from os import PathLike
 from typing import Any
 
+from impostor.checks import check_path
 from impostor.errors import FanFileError
 from impostor.files.fan_manifest import MAX_MANIFEST_BYTES, Manifest, check_version, parse_manifest
 
@@ -30,6 +31,7 @@ def write_archive(path: FilePath, entries: dict[str, bytes]) -> None:
 @contextmanager
 def open_archive(path: FilePath) -> Iterator[tuple[zipfile.ZipFile, Manifest]]:
     """The archive, found to hold what its manifest says and nothing else, and the manifest."""
+    check_path(path)
     if not os.path.isfile(path):  # a pipe would wait for ever
         raise FanFileError(path, "no such file; expected a .fan")
     with ExitStack() as stack:

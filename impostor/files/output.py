@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from impostor.checks import check_path
 from impostor.errors import OutputError
 
 try:
@@ -36,6 +37,7 @@ def check_output(path: str | os.PathLike[str], force: bool = False) -> None:
         The file exists and `force` is not given, it is something else than a file, or its directory is missing or
         cannot be written.
     """
+    check_path(path)
     final = Path(path)
     if final.is_dir():
         raise OutputError(path, "is a directory; expected a file name")

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from impostor.checks import check_path, check_type
 from impostor.errors import PtmFileError, SettingsError
 from impostor.files.output import atomic_output, check_output
 from impostor.files.ptm_header import (
@@ -48,6 +49,7 @@ def read_ptm(path: FilePath) -> Ptm:
     PtmFileError
         Anything in the file is not as PTM.md says. Nothing is allocated on the word of the header alone.
     """
+    check_path(path)
     data = _file_bytes(path)
     header = parse_header(data, path)
     trailer = parse_trailer(data, header.body + header.body_bytes, path)
@@ -116,6 +118,7 @@ def write_ptm(
     SettingsError
         No `.ptm` file can hold the PTM, or a choice is not one of those above.
     """
+    check_type("ptm", ptm, Ptm)
     check_output(path, force)
     if max(ptm.size) > LARGEST_SIDE:
         raise SettingsError(path, f"PTM is {ptm.size[0]} x {ptm.size[1]}; expected sides up to {LARGEST_SIDE}")
