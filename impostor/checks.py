@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from numbers import Integral, Real
-from os import PathLike
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -84,17 +83,6 @@ def check_whole(where: str, value: object, low: int, high: int) -> int:
         return int(value)
     found = value if isinstance(value, Real) else f"a {type(value).__name__}"
     raise SettingsError(where, f"{found}; expected a whole number from {low} to {high}")
-
-
-def check_path(path: object) -> None:
-    """Refuse what names no file: Python would take a whole number for one that is open already.
-
-    Raises
-    ------
-    SettingsError
-    """
-    if not isinstance(path, str | PathLike):
-        raise SettingsError("path", f"a {type(path).__name__}; expected a str or a path")
 
 
 def check_type(where: str, value: object, kind: type, origin: str = "") -> None:

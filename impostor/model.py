@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from impostor.checks import check_path
 from impostor.errors import ModelError, SettingsError
 from impostor.importing.checks import CHECKS, prepared
 from impostor.importing.gltf_scene import read_gltf
@@ -17,6 +16,7 @@ from impostor.importing.materials import Material
 from impostor.importing.mesh_parts import imported_parts
 from impostor.importing.parts import MOST_TRIANGLES, Part, checked, finished_part, joined
 from impostor.importing.sources import ModelFiles
+from impostor.paths import check_path
 
 __all__ = ["SUFFIXES", "Material", "Model", "Primitive", "load_model"]
 

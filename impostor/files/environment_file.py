@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from impostor.checks import check_path, check_type
+from impostor.checks import check_type
 from impostor.environment import Environment
 from impostor.environment.environment import FACE_SIZES, is_face_size
 from impostor.environment.panorama import (
@@ -29,6 +29,7 @@ from impostor.files.cube_files import (
 )
 from impostor.files.output import atomic_output, check_output
 from impostor.files.radiance_file import WRITTEN, FilePath, picture_size, read_radiance, write_radiance
+from impostor.paths import check_path
 
 
 def read_environment(

@@ -11,9 +11,9 @@ from contextlib import ExitStack, contextmanager
 from os import PathLike
 from typing import Any
 
-from impostor.checks import check_path
 from impostor.errors import FanFileError
 from impostor.files.fan_manifest import MAX_MANIFEST_BYTES, Manifest, check_version, parse_manifest
+from impostor.paths import check_path
 
 FilePath = str | PathLike[str]
 MAX_ENTRIES = 64

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from impostor.checks import check_path
 from impostor.errors import OutputError
+from impostor.paths import check_path
 
 try:
     import fcntl

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from impostor.checks import check_path, check_type
+from impostor.checks import check_type
 from impostor.errors import PtmFileError, SettingsError
 from impostor.files.output import atomic_output, check_output
 from impostor.files.ptm_header import (
@@ -25,6 +25,7 @@ from impostor.files.ptm_header import (
     trailer_bytes,
 )
 from impostor.files.ptm_planes import decode_planes, encode_planes
+from impostor.paths import check_path
 from impostor.ptm.polynomials import RGB_FROM_YCRCB, TERMS
 from impostor.ptm.quantise import WHITE, Ptm
 
