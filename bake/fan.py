@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from bake.capture import Capture
 from bake.resolve import CapturedView, TileLayers, dilate, resolve
 from bake.settings import RING_ELEVATION_DEG, camera_bases
+from impostor.checks import check_type
 from impostor.errors import SettingsError
 from impostor.fan import DEPTH_CODES, Fan
 from impostor.model import Model
@@ -76,7 +77,9 @@ def bake_fan(
     ----------
     Dinh, Metoyer, Turk, figures 1 and 3.
     """
+    check_type("model", model, Model, ", as impostor.load_model gives")
     bases = camera_bases(views, elevation_deg, layout, size, distance, samples)
+    views, size, samples = int(views), int(size), samples and int(samples)  # NumPy's own are not for a manifest
     cameras = frame(bases, np.concatenate([part.positions for part in model.primitives]), size, distance)
     if FARTHEST * model.radius < distance < np.inf:
         most = f"at most {FARTHEST * model.radius:.4g} m for this object, or none for an orthographic camera"

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from numbers import Real
 
 import numpy as np
 
+from impostor.checks import check_whole
 from impostor.errors import SettingsError
 from impostor.fan import MAX_SIZE, MIN_SIZE
-from impostor.views import layout_bases
+from impostor.views import MAX_VIEWS, layout_bases
 
 RING_ELEVATION_DEG = 15.0
 SAMPLES = (1, 2, 4)
@@ -24,12 +26,16 @@ def camera_bases(
     SettingsError
         A number or a choice out of range, or an elevation for something else than a ring.
     """
+    check_whole("views", views, 1, MAX_VIEWS)
+    check_whole("size", size, MIN_SIZE, MAX_SIZE)
+    if elevation_deg is not None and not isinstance(elevation_deg, Real):
+        raise SettingsError("elevation", f"a {type(elevation_deg).__name__}; expected a number of degrees")
+    if not isinstance(distance, Real):
+        raise SettingsError("distance", f"a {type(distance).__name__}; expected a distance above 0")
     elevation = RING_ELEVATION_DEG if elevation_deg is None else elevation_deg
     bases = layout_bases(layout, views, math.radians(elevation))
     if elevation_deg is not None and layout != "ring":
         raise SettingsError("elevation", f"{elevation_deg:g} degrees of a {layout}; expected it of a ring only")
-    if not MIN_SIZE <= size <= MAX_SIZE:
-        raise SettingsError("size", f"{size} texels; expected {MIN_SIZE} to {MAX_SIZE}")
     if not distance > 0:
         raise SettingsError("distance", f"{distance:g} m; expected a distance above 0")
     if samples is not None and samples not in SAMPLES:

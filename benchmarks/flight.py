@@ -196,7 +196,12 @@ def switches_held(before: Seen, now: Seen, kinds: Sequence[str]) -> Iterator[Non
     """Views, tiles' mip levels and shadows' views are chosen as for an earlier frame, and nothing known is relit."""
     eye = before.viewer.eye
     turned = np.append(np.subtract(before.toward_light, now.toward_light), 0.0)
-    levels_of, shown_to, quads_toward = impostors._levels, Batch.shown_to, shadow_strips.quads_toward
+    levels_of, seen_by, quads_toward = impostors._levels, Batch.seen_by, shadow_strips.quads_toward
+
+    def seen(batch: Batch, viewer: Viewer) -> Quads:
+        quads, fades = seen_by(batch, viewer), batch.fades
+        known = fades._seen.take(quads.index) == fades._frame
+        return replace(quads, view=np.where(known, fades.shown.take(quads.index), quads.view))
 
     def quads(instances: Instances, _eye: NDArray[np.float64], viewer: Viewer | None = None) -> Quads:
         return _with_view(instances, quads_toward(instances, _eye, viewer), eye)
@@ -207,9 +212,8 @@ def switches_held(before: Seen, now: Seen, kinds: Sequence[str]) -> Iterator[Non
 
     with ExitStack() as stack:
         hold: Callable[..., object] = lambda *arguments: stack.enter_context(patch.object(*arguments))  # noqa: E731
-        # As in a frame of its own, in which no time has passed, and of which nobody asks what it fades to.
-        hold(Batch, "shown_to", lambda batch, viewer, _, fade: shown_to(batch, viewer, 0.0, fade))
-        hold(ViewFades, "update", _only_what_is_new)
+        if "views" in kinds:
+            hold(Batch, "seen_by", seen)
         if "shadows" in kinds:
             hold(shadow_strips, "quads_toward", quads)
             hold(shadow_strips, "nearest_views", lambda fan, toward, index: nearest_views(fan, toward + turned, index))
@@ -218,13 +222,6 @@ def switches_held(before: Seen, now: Seen, kinds: Sequence[str]) -> Iterator[Non
         hold(relighting, "TEXELS_A_FRAME", 0)
         hold(relighting, "LARGEST_ERROR", 1e9)
         yield
-
-
-def _only_what_is_new(fades: ViewFades, copies: NDArray[np.intp], nearest: NDArray[np.intp], *_: float) -> None:
-    """Instead of `ViewFades.update`: only copies that were not in the last frame get a view."""
-    new = fades._seen.take(copies) != fades._frame
-    fades.shown[copies[new]], fades.share[copies[new]] = nearest[new], 1
-    fades.fading = bool((fades.share.take(copies) < 1).any())
 
 
 def _with_view(instances: Instances, quads: Quads, eye: NDArray[np.float64]) -> Quads:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from numbers import Real
+from numbers import Integral, Real
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,12 +31,15 @@ def numbers(where: str, name: str, values: ArrayLike, *shapes: tuple[int, ...]) 
     SettingsError
         No numbers, another shape, or one that is not finite.
     """
+    given = None
     try:
         given = np.asarray(values)
         # NumPy would read the text "2" as 2.
-        array = None if given.dtype.kind in "SU" else np.asarray(given, float)
+        array = None if given.dtype.kind in "SUc" else np.asarray(given, float)
     except (TypeError, ValueError):
         array = None
+    if given is not None and given.dtype.kind == "c":
+        raise SettingsError(where, f"{name} of complex numbers; expected real ones")
     if array is None:
         found = f"{name} is a {type(values).__name__}"
         raise SettingsError(where, f"{found}; expected numbers of shape {_in_words(shapes)}")
@@ -68,6 +71,20 @@ def check_number(
         raise SettingsError(where, f"{name} {value}; expected {expected}")
 
 
+def check_whole(where: str, value: object, low: int, high: int) -> int:
+    """A whole number from `low` to `high`, as Python's own.
+
+    Raises
+    ------
+    SettingsError
+        Another number, or something else.
+    """
+    if isinstance(value, Integral) and not isinstance(value, bool) and low <= int(value) <= high:
+        return int(value)
+    found = value if isinstance(value, Real) else f"a {type(value).__name__}"
+    raise SettingsError(where, f"{found}; expected a whole number from {low} to {high}")
+
+
 def check_type(where: str, value: object, kind: type, origin: str = "") -> None:
     """Refuse what is not of a type; `origin` says where such a thing comes from.
 
@@ -76,8 +93,12 @@ def check_type(where: str, value: object, kind: type, origin: str = "") -> None:
     SettingsError
     """
     if not isinstance(value, kind):
-        article = "an" if kind.__name__[0] in "AEIOUaeiou" else "a"
-        raise SettingsError(where, f"a {type(value).__name__}; expected {article} {kind.__name__}{origin}")
+        raise SettingsError(where, f"a {type(value).__name__}; expected {with_article(kind)}{origin}")
+
+
+def with_article(kind: type) -> str:
+    """The name of a type after "a" or "an"."""
+    return f"{'an' if kind.__name__[0] in 'AEIOUaeiou' else 'a'} {kind.__name__}"
 
 
 def _fits(found: tuple[int, ...], wanted: tuple[int, ...]) -> bool:

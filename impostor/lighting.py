@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from impostor.checks import check_number, numbers
 from impostor.errors import SettingsError
 from impostor.normal_code import BYTE_TO_NORMAL
 from impostor.views import direction
@@ -38,12 +40,14 @@ class DirectionalLight:
     softness: float = 0.0
 
     def __post_init__(self):
-        toward, color = np.asarray(self.toward, float), np.asarray(self.color, float)
-        length = float(np.linalg.norm(toward)) if toward.shape == (3,) else np.nan
+        toward, color = _three(self.toward), _three(self.color)
+        length = float(np.linalg.norm(toward))
         if not (np.isfinite(length) and length > 1e-12):
             raise SettingsError("light", f"direction {self.toward}; expected three finite numbers, not all zero")
-        if color.shape != (3,) or not np.all(np.isfinite(color)) or np.any(color < 0):
+        if not np.all(color >= 0):
             raise SettingsError("light", f"colour {self.color}; expected three finite numbers, none negative")
+        if not isinstance(self.softness, Real):
+            check_number("light", "softness", self.softness, 0)
         if not 0 <= self.softness < np.pi / 2:
             raise SettingsError("light", f"softness {self.softness}; expected radians from 0 to below {np.pi / 2:.4f}")
         object.__setattr__(self, "toward", tuple((toward / length).tolist()))
@@ -51,10 +55,11 @@ class DirectionalLight:
 
     @classmethod
     def from_angles(cls, azimuth_deg: float, elevation_deg: float, color: ArrayLike = (1.0, 1.0, 1.0)):
-        """The light that stands at an azimuth and an elevation, in degrees."""
-        r, g, b = np.asarray(color, float).tolist()
+        """The light that stands at an azimuth and an elevation, -90 to 90, in degrees."""
+        check_number("light", "azimuth", azimuth_deg)
+        check_number("light", "elevation", elevation_deg, -90, 90)
         x, y, z = direction(np.radians(azimuth_deg), np.radians(elevation_deg)).tolist()
-        return cls((x, y, z), (r, g, b))
+        return cls((x, y, z), color)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -81,13 +86,13 @@ class LocalLight:
     radius: float = 0.05
 
     def __post_init__(self):
-        position, color = np.asarray(self.position, float), np.asarray(self.color, float)
-        if position.shape != (3,) or not np.all(np.isfinite(position)):
+        position, color = _three(self.position), _three(self.color)
+        if not np.all(np.isfinite(position)):
             raise SettingsError("light", f"position {self.position}; expected three finite numbers")
-        if color.shape != (3,) or not np.all(np.isfinite(color)) or np.any(color < 0):
+        if not np.all(color >= 0):
             raise SettingsError("light", f"colour {self.color}; expected three finite numbers, none negative")
-        if not 0 < self.radius < np.inf:
-            raise SettingsError("light", f"radius {self.radius}; expected a number above 0")
+        if not isinstance(self.radius, Real) or not 0 < self.radius < np.inf:
+            check_number("light", "radius", self.radius, 0, above=True)
         object.__setattr__(self, "position", tuple(position.tolist()))
         object.__setattr__(self, "color", tuple(color.tolist()))
 
@@ -111,6 +116,15 @@ class Gloss:
         if not (0 <= self.strength < np.inf and 0 < self.shininess < np.inf):
             found = f"strength {self.strength}, shininess {self.shininess}"
             raise SettingsError("gloss", f"{found}; expected strength of at least 0, shininess above 0")
+
+
+def _three(values: object) -> NDArray[np.float64]:
+    """Three finite numbers, or three that are none."""
+    try:
+        found = numbers("light", "three", values, (3,))  # type: ignore[arg-type]
+    except SettingsError:
+        return np.full(3, np.nan)
+    return found
 
 
 class Colormap(NamedTuple):

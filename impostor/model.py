@@ -16,6 +16,7 @@ from impostor.importing.materials import Material
 from impostor.importing.mesh_parts import imported_parts
 from impostor.importing.parts import MOST_TRIANGLES, Part, checked, finished_part, joined
 from impostor.importing.sources import ModelFiles
+from impostor.paths import check_path
 
 __all__ = ["SUFFIXES", "Material", "Model", "Primitive", "load_model"]
 
@@ -166,6 +167,7 @@ def load_model(path: str | PathLike[str], *, up: str = "y", allow_missing_textur
     colours of materials are sRGB values. Missing normals are computed: flat for glTF, as its specification asks, else
     smooth up to a crease of 40 degrees (80 in PLY, whose scans are noisy).
     """
+    check_path(path)
     if up not in ("y", "z"):
         raise SettingsError("up", f"'{up}', expected 'y' or 'z'")
     suffix = Path(path).suffix.lower()

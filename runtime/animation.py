@@ -215,5 +215,4 @@ class AnimatedInstances:
 
     def remove(self) -> None:
         """Take the copies out of the renderer again."""
-        for pose in self.poses:
-            self._renderer.remove(pose)
+        self._renderer.remove(self)

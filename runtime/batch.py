@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from runtime.dither import divided, part_of
 from runtime.fan_textures import FanTextures
 from runtime.instances import Instances, Quads, Viewer, quads_toward
 from runtime.lod import Levels
@@ -64,28 +65,20 @@ class Batch:
         return quads if shares.all() else quads.take(shares != 0)
 
     def shown_to(self, viewer: Viewer, seconds: float | None, fade_seconds: float) -> Shown:
-        """What a viewer is shown, so many seconds after the last frame; None is a look from elsewhere in between."""
+        """What a viewer is shown, so many seconds after the last frame; None is one more look at the same frame."""
         quads = self.seen_by(viewer)
-        shares, copies = self._shares_of(quads), quads.index
-        # Shares below 0 take their pixels from the other end.
-        parts = np.empty((len(quads), 2), np.float32)
-        parts[:, 0], parts[:, 1] = (1 + shares) * (shares < 0), np.where(shares < 0, 1, shares)
-        if seconds is None:
-            return Shown(quads, copies, parts)
-        fades = self.fades
-        fades.update(copies, quads.view, seconds, fade_seconds)
-        views = fades.shown.take(copies)
-        if not fades.fading:
-            return Shown(Quads(quads.placement, copies, views), copies, parts)
-        part = fades.share.take(copies)
-        fading = np.flatnonzero(part < 1)
-        leaving = parts[fading]
-        leaving[:, 0] = parts[fading, 1] = leaving[:, 0] + part[fading] * (leaving[:, 1] - leaving[:, 0])
-        again = copies[fading]
-        quads = Quads(
-            quads.placement, np.concatenate([copies, again]), np.concatenate([views, fades.leaving.take(again)])
-        )
-        return Shown(quads, np.concatenate([copies, again + len(self.instances)]), np.concatenate([parts, leaving]))
+        slots, parts = quads.index, part_of(self._shares_of(quads))
+        if seconds is not None:
+            self.fades.update(slots, quads.view, seconds, fade_seconds)
+        share = self.fades.shares(slots, quads.view)
+        fading = np.flatnonzero(share < 1)
+        if not len(fading):
+            return Shown(quads, slots, parts)
+        copies = slots[fading]
+        parts[fading], leaving = divided(parts[fading], share[fading])
+        view = np.concatenate([quads.view, self.fades.leaving.take(copies)])
+        quads = Quads(quads.placement, np.concatenate([slots, copies]), view)
+        return Shown(quads, np.concatenate([slots, copies + len(self.instances)]), np.concatenate([parts, leaving]))
 
     def _shares_of(self, quads: Quads) -> NDArray[np.float32]:
         """The part (N,) of each one's pixels that shows the fan; below 0, from the other end of the dither."""

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from impostor.errors import SettingsError
 from impostor.views import basis_facing, direction
+from runtime.checks import check_number, numbers
 
 FRAME_MARGIN = 1.02  # the picture is this much larger than the bounding sphere
 
@@ -64,9 +65,12 @@ class Camera:
         Raises
         ------
         SettingsError
-            Eye and target coincide, or the field of view or the range is impossible.
+            Eye and target coincide; a field of view, an aspect or a range that is impossible; what is no number.
         """
-        eye, target = np.asarray(eye, float), np.asarray(target, float)
+        eye, target = numbers("camera", "eye", eye, (3,)), numbers("camera", "target", target, (3,))
+        for name, value in (("fov_deg", fov_deg), ("near", near), ("far", far)):
+            check_number("camera", name, value)
+        check_number("camera", "aspect", aspect, 0, above=True)
         if not np.linalg.norm(eye - target) > 0:
             raise SettingsError("camera", f"eye and target are both {eye.tolist()}; expected two different points")
         if not 0 < fov_deg < 180:
@@ -95,12 +99,22 @@ class Camera:
             Radians; where the camera stands.
         aspect : float
             Width over height; the sphere fits the shorter side.
+
+        Raises
+        ------
+        SettingsError
+            A radius or an aspect that is not above 0; what is no number.
         """
+        center = numbers("camera", "center", center, (3,))
+        for name, value in (("azimuth", azimuth), ("elevation", elevation)):
+            check_number("camera", name, value)
+        for name, value in (("radius", radius), ("aspect", aspect)):
+            check_number("camera", name, value, 0, above=True)
         half = radius * FRAME_MARGIN
         # Ground beyond the sphere is seen too: leave it room along the line of sight.
         depth = 20 * radius
         clip = np.diag([1 / (half * max(aspect, 1)), min(aspect, 1) / half, -1 / depth, 1.0])
-        return cls(clip, _view_from_world(basis_facing(direction(azimuth, elevation)), np.asarray(center, float)))
+        return cls(clip, _view_from_world(basis_facing(direction(azimuth, elevation)), center))
 
 
 def _view_from_world(basis: NDArray[np.float64], origin: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -20,7 +20,8 @@ from impostor.errors import GpuError
 UNITS = 6  # texture units that the passes bind, from 0
 
 _BLEND, _DEPTH_TEST, _CULL_FACE, _SCISSOR_TEST, _STENCIL_TEST = 0x0BE2, 0x0B71, 0x0B44, 0x0C11, 0x0B90
-_POLYGON_OFFSET_FILL, _FRAMEBUFFER_SRGB, _RASTERIZER_DISCARD = 0x8037, 0x8DB9, 0x8C89
+_POLYGON_OFFSET_FILL, _POLYGON_OFFSET_LINE, _POLYGON_OFFSET_POINT = 0x8037, 0x2A02, 0x2A01
+_FRAMEBUFFER_SRGB, _RASTERIZER_DISCARD = 0x8DB9, 0x8C89
 _SAMPLE_ALPHA_TO_COVERAGE, _COLOR_LOGIC_OP, _DEPTH_CLAMP, _PROGRAM_POINT_SIZE = 0x809E, 0x0BF2, 0x864F, 0x8642
 _SWITCHES = (
     _BLEND,
@@ -29,6 +30,8 @@ _SWITCHES = (
     _SCISSOR_TEST,
     _STENCIL_TEST,
     _POLYGON_OFFSET_FILL,
+    _POLYGON_OFFSET_LINE,
+    _POLYGON_OFFSET_POINT,
     _FRAMEBUFFER_SRGB,
     _RASTERIZER_DISCARD,
     _SAMPLE_ALPHA_TO_COVERAGE,
@@ -222,6 +225,9 @@ def set_state(
     _call("glFrontFace", 0x0901)  # shaders ask for it, too
     if cull_back:
         _call("glCullFace", 0x0405)
+    # moderngl switches all three on together, and there are drivers on which one for lines moves fills.
+    for name in (_POLYGON_OFFSET_LINE, _POLYGON_OFFSET_POINT):
+        _switch(name, False)
     _switch(_POLYGON_OFFSET_FILL, polygon_offset is not None)
     if polygon_offset is not None:
         _polygon_offset(*polygon_offset)

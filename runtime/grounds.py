@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from impostor.errors import SettingsError
 from impostor.shadow_projection import Ground
-from runtime.checks import check_type
+from runtime.checks import LARGEST, bounded, check_number, check_type
 from runtime.environments import RoomTable
 from runtime.gl_state import CallerState, set_state
 from runtime.gpu import SRGB8_ALPHA8, check_texture_size, load_program, set_uniforms
@@ -37,6 +37,11 @@ class GroundSurface:
         Metres to where it is gone; it starts to fade at half of that.
     background : tuple of float
         What it fades into: sRGB curve, premultiplied. Without alpha, as it is, that is what was drawn before.
+
+    Raises
+    ------
+    SettingsError
+        Numbers of another count, not finite or below 0; a tile or a reach that is not above 0; another texture.
     """
 
     albedo: tuple[float, float, float] = (0.5, 0.5, 0.5)
@@ -46,26 +51,24 @@ class GroundSurface:
     reach: float = 100.0
     background: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
+    def __post_init__(self):
+        for name, count in (("albedo", 3), ("middle", 3), ("background", 4)):
+            given = bounded("ground surface", name, getattr(self, name), (count,))
+            if name != "middle" and given.min() < 0:
+                raise SettingsError("ground surface", f"{name} goes down to {given.min():g}; expected at least 0")
+        for name in ("tile", "reach"):
+            check_number("ground surface", name, getattr(self, name), 0, LARGEST, above=True)
+        texture = self.texture
+        if texture is None:
+            return
+        check_type("ground texture", texture, np.ndarray)
+        if texture.dtype != np.uint8 or texture.ndim != 3 or texture.shape[2] != 4 or not texture.size:
+            raise SettingsError("ground texture", f"{texture.shape} {texture.dtype}; expected (H, W, 4) uint8")
+
     @property
     def fade(self) -> tuple[float, float]:
         """Metres from the middle where it starts to fade and where nothing is left."""
         return self.reach / 2, self.reach
-
-
-def check_surface(surface: GroundSurface) -> None:
-    """Refuse what is no surface, or one with an impossible texture.
-
-    Raises
-    ------
-    SettingsError
-    """
-    check_type("surface", surface, GroundSurface)
-    texture = surface.texture
-    if texture is None:
-        return
-    check_type("ground texture", texture, np.ndarray)
-    if texture.dtype != np.uint8 or texture.ndim != 3 or texture.shape[2] != 4 or not texture.size:
-        raise SettingsError("ground texture", f"{texture.shape} {texture.dtype}; expected (H, W, 4) uint8")
 
 
 class GroundPass:

@@ -23,7 +23,7 @@ from runtime.relighting import Relighter, ShownTiles, light_is_everywhere_alike
 from runtime.tiles import CacheFull, CellIndex, TileCache, TileIndex, key_levels, shared_side, tile_keys
 from runtime.view_fades import VIEW_FADE_SECONDS
 
-PART_DTYPE = np.dtype([("fan_part", "f4", (2,))])
+PART_DTYPE = np.dtype([("part", "f4", (2,))])
 ALPHA_CUTOFF = 1 / 32
 STATISTICS = ("instances", "fading", "triangles_spared", "tiles", "relit", "coarser")
 # A tile may be drawn this much larger than it is before the next finer mip level is relit.
@@ -37,8 +37,8 @@ class _Drawing:
         self.program = load_program(ctx, "impostor.vert", fragment)
         self.quads, self._parts = InstanceBuffer(ctx, QUAD_DTYPE), InstanceBuffer(ctx, PART_DTYPE)
         content = [(corners, "2f", "corner"), (self.quads.buffer, QUAD_FORMAT, *(QUAD_DTYPE.names or ()))]
-        if "fan_part" in self.program:
-            content.append((self._parts.buffer, "2f/i", "fan_part"))
+        if "part" in self.program:
+            content.append((self._parts.buffer, "2f/i", "part"))
         self.array, self.count = ctx.vertex_array(self.program, content), 0
 
     def write(self, quads: NDArray[np.float32], parts: NDArray[np.float32], viewer: Viewer, cache_side: int) -> None:
@@ -47,7 +47,7 @@ class _Drawing:
         if not len(quads):
             return
         self.quads.write(quads)
-        if "fan_part" in self.program:
+        if "part" in self.program:
             self._parts.write(parts)
         set_uniforms(
             self.program,
@@ -133,6 +133,9 @@ class ImpostorPass:
             self._frame = None
             self._arrange(batches, viewer, seconds)
             self._frame = frame
+        elif seconds:
+            for batch in batches:
+                batch.fades.rest(seconds)
         cache = self._cache
         if cache is None or not self.statistics["instances"]:
             return

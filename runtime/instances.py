@@ -13,7 +13,7 @@ from impostor.environment.reflection import Reflection
 from impostor.errors import SettingsError
 from impostor.fan import Fan
 from impostor.lighting import Gloss
-from runtime.checks import check_type, numbers
+from runtime.checks import bounded, check_type, numbers
 from runtime.placement import Placement, ViewVectors
 
 
@@ -48,8 +48,9 @@ class Instances:
     Raises
     ------
     SettingsError
-        No fan, arrays whose lengths differ, a number that is not finite, a scale that is not positive. Also where an
-        array or the reflection is replaced; of what is written into one, copies that cannot be drawn are left out.
+        No fan, arrays whose lengths differ, a number that is not finite or beyond 1e15, a scale that is not positive.
+        Also where an array or the reflection is replaced; of what is written into one, copies that cannot be drawn are
+        left out.
     """
 
     def __init__(
@@ -64,7 +65,7 @@ class Instances:
         check_type("fan", fan, Fan, ", as impostor.load gives")
         self.fan, self.gloss, self.reflection = fan, gloss or Gloss(), reflection
         check_type("gloss", self.gloss, Gloss)
-        self._positions = np.array(numbers(fan.name, "positions", positions, (-1, 3), (3,), (0,)).reshape(-1, 3))
+        self._positions = np.array(bounded(fan.name, "positions", positions, (-1, 3), (3,), (0,)).reshape(-1, 3))
         count = len(self._positions)
         self._yaws, self._scales, self._visible = np.zeros(count), np.ones(count), np.ones(count, bool)
         self._shares = np.ones(count, np.float32)
@@ -88,7 +89,7 @@ class Instances:
 
     @positions.setter
     def positions(self, values: ArrayLike) -> None:
-        self._positions[:] = numbers(self.fan.name, "positions", values, self._positions.shape)
+        self._positions[:] = bounded(self.fan.name, "positions", values, self._positions.shape)
 
     @property
     def yaws(self) -> NDArray[np.float64]:
@@ -96,7 +97,7 @@ class Instances:
 
     @yaws.setter
     def yaws(self, values: ArrayLike) -> None:
-        self._yaws[:] = numbers(self.fan.name, "yaws", values, self._yaws.shape, ())
+        self._yaws[:] = bounded(self.fan.name, "yaws", values, self._yaws.shape, ())
 
     @property
     def scales(self) -> NDArray[np.float64]:
@@ -104,7 +105,7 @@ class Instances:
 
     @scales.setter
     def scales(self, values: ArrayLike) -> None:
-        scales = numbers(self.fan.name, "scales", values, self._scales.shape, ())
+        scales = bounded(self.fan.name, "scales", values, self._scales.shape, ())
         if np.any(scales <= 0):
             raise SettingsError(self.fan.name, f"scales go down to {scales.min():g}; expected more than 0")
         self._scales[:] = scales

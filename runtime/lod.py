@@ -12,6 +12,7 @@ from impostor.errors import SettingsError
 from impostor.fan import Fan
 from impostor.model import Model
 from impostor.views import rotation_about_y
+from runtime.dither import WHOLE, rest_of
 from runtime.instances import Instances, Viewer
 from runtime.meshes import MeshBuffers, MeshCopies
 from runtime.placement import Placement
@@ -155,11 +156,12 @@ class Levels:
     def copies(self) -> list[MeshCopies]:
         """What is drawn as meshes: whole ones, and those in a crossfade with what is left to their fan."""
         instances, share = self.instances, self.fan_share
-        near = np.flatnonzero(instances.visible & (share < 1))
-        groups = near[share[near] == 0], near[share[near] > 0]
+        near = np.flatnonzero(instances.visible & (share < 1) & (instances.shares != 0))
+        parts = rest_of(instances.shares[near], instances.shares[near] * share[near])
+        whole = (parts == WHOLE).all(axis=1)
         return [
-            MeshCopies(self.buffers, instances.gloss, _world_from_model(instances, index), shares, instances.reflection)
-            for index, shares in zip(groups, (None, share[groups[1]]), strict=True)
+            MeshCopies(self.buffers, instances.gloss, _world_from_model(instances, index), part, instances.reflection)
+            for index, part in ((near[whole], None), (near[~whole], parts[~whole]))
             if len(index)
         ]
 

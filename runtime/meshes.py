@@ -13,7 +13,8 @@ from impostor.environment.reflection import Reflection
 from impostor.lighting import Gloss
 from impostor.model import Material, Model, Primitive
 from runtime.bump import Bump, bump_texture, with_tangents
-from runtime.checks import check_type, numbers
+from runtime.checks import LARGEST, bounded, check_type
+from runtime.dither import WHOLE
 from runtime.environments import RoomTable
 from runtime.gl_state import CallerState, set_state
 from runtime.gpu import SRGB8_ALPHA8, InstanceBuffer, check_texture_size, load_program, set_uniforms
@@ -36,8 +37,8 @@ VERTEX_DTYPE = np.dtype([("position", "f4", (3,)), ("normal", "f4", (3,)), ("uv"
 BUMPED_DTYPE = np.dtype([*VERTEX_DTYPE.descr, ("tangent", "f4", (4,))])
 VERTEX_FORMATS = {"position": ("3f", "12x"), "normal": ("3f", "12x"), "uv": ("2f", "8x"), "tint": ("4f1", "4x")}
 BUMPED_FORMATS = {**VERTEX_FORMATS, "tangent": ("4f", "16x")}
-COPY_DTYPE = np.dtype([("row_0", "f4", (4,)), ("row_1", "f4", (4,)), ("row_2", "f4", (4,)), ("fan_share", "f4")])
-COPY_FORMATS = {"row_0": ("4f", "16x"), "row_1": ("4f", "16x"), "row_2": ("4f", "16x"), "fan_share": ("1f", "4x")}
+COPY_DTYPE = np.dtype([("row_0", "f4", (4,)), ("row_1", "f4", (4,)), ("row_2", "f4", (4,)), ("part", "f4", (2,))])
+COPY_FORMATS = {"row_0": ("4f", "16x"), "row_1": ("4f", "16x"), "row_2": ("4f", "16x"), "part": ("2f", "8x")}
 
 
 class MeshPart:
@@ -152,7 +153,7 @@ class MeshInstance:
 
 
 def check_meshes(meshes: Sequence[MeshInstance]) -> None:
-    """Refuse a `world_from_model` that has become no finite (4, 4) matrix, and a `reflection` that is none.
+    """Refuse a `world_from_model` that has become none that can be drawn, and a `reflection` that is none.
 
     Raises
     ------
@@ -162,9 +163,9 @@ def check_meshes(meshes: Sequence[MeshInstance]) -> None:
         matrices = np.array([mesh.world_from_model for mesh in meshes], float)
     except (TypeError, ValueError):
         matrices = np.empty(0)
-    if len(meshes) and (matrices.shape != (len(meshes), 4, 4) or not np.isfinite(matrices).all()):
+    if len(meshes) and (matrices.shape != (len(meshes), 4, 4) or not (np.abs(matrices) < LARGEST).all()):
         for mesh in meshes:
-            numbers(mesh.buffers.model.name, "world_from_model", mesh.world_from_model, (4, 4))
+            bounded(mesh.buffers.model.name, "world_from_model", mesh.world_from_model, (4, 4))
     for mesh in meshes:
         if mesh.reflection is not None:
             check_type("reflection", mesh.reflection, Reflection)
@@ -180,15 +181,15 @@ class MeshCopies:
     gloss : Gloss
     world_from_model : ndarray, (N, 4, 4) float64
         Affine.
-    fan_share : ndarray, (N,) float32, optional
-        The part of each copy's pixels that is left to its fan, in a crossfade.
+    parts : ndarray, (N, 2) float32, optional
+        Of the dither, from and to: which pixels of each copy are drawn, in a crossfade.
     reflection : Reflection, optional
     """
 
     buffers: MeshBuffers
     gloss: Gloss
     world_from_model: NDArray[np.float64]
-    fan_share: NDArray[np.float32] | None = None
+    parts: NDArray[np.float32] | None = None
     reflection: Reflection | None = None
 
     @classmethod
@@ -225,15 +226,14 @@ class MeshCopies:
 
     def take(self, index: NDArray[np.intp]) -> MeshCopies:
         """Some of them."""
-        shares = None if self.fan_share is None else self.fan_share[index]
-        return MeshCopies(self.buffers, self.gloss, self.world_from_model[index], shares, self.reflection)
+        parts = None if self.parts is None else self.parts[index]
+        return MeshCopies(self.buffers, self.gloss, self.world_from_model[index], parts, self.reflection)
 
     def records(self) -> NDArray[np.void]:
         """As (N,) COPY_DTYPE."""
         rows = np.zeros((len(self.world_from_model), COPY_DTYPE.itemsize // 4), np.float32)
         rows[:, :12] = self.world_from_model[:, :3].reshape(-1, 12)
-        if self.fan_share is not None:
-            rows[:, 12] = self.fan_share
+        rows[:, 12:14] = WHOLE if self.parts is None else self.parts
         return rows.view(COPY_DTYPE)[:, 0]
 
 
@@ -318,7 +318,7 @@ def _parts(group: MeshCopies, rooms: RoomTable | None) -> list[tuple[str, int, M
         return []
     bumped = group.buffers.bump is not None
     if rooms is None or not len(rooms):
-        return [("mesh_bump" if bumped else "mesh" if group.fan_share is None else "mesh_fading", 0, group)]
+        return [("mesh_bump" if bumped else "mesh" if group.parts is None else "mesh_fading", 0, group)]
     suffix = "_mirrored" if bumped or group.reflection is not None else ""
     if len(rooms) == 1:
         return [(f"mesh_room{suffix}", 0, group)]

@@ -60,6 +60,10 @@ class Placed:
                 buffers.release()
         return [batch.instances.fan for batch in gone]
 
+    def holds(self, placed: object) -> bool:
+        """Whether copies or a mesh are there."""
+        return any(placed is each for each in (*(batch.instances for batch in self.batches), *self.meshes))
+
     @property
     def levels(self) -> list[Levels]:
         """Of all fans that have a mesh."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impostor.views import Views, ring_bases
+from runtime.checks import LARGEST, SMALLEST
 
 
 class ViewVectors:
@@ -112,8 +113,10 @@ class Placement:
         scales: NDArray[np.float64],
     ) -> Placement:
         """Copies at positions (N, 3), with yaws (N,) and scales (N,) as the caller has written them."""
-        # Not a number in any of them makes the sum none either.
-        drawable = np.isfinite(positions.sum(axis=1) + yaws + scales) & (scales > 0)
+        with np.errstate(over="ignore"):
+            # Not a number in any of them makes the sum none either, which is not below anything.
+            reach = np.abs(positions).sum(axis=1) + np.abs(yaws) + view_vectors.reach * scales
+            drawable = (reach + scales < LARGEST) & (scales > SMALLEST)
         positions = np.where(drawable, positions.T, 0.0)
         yaws, scales = np.where(drawable, yaws, 0.0), np.where(drawable, scales, 0.0)
         turns = np.exp(1j * yaws)

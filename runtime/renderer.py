@@ -17,11 +17,12 @@ from impostor.lighting import Gloss
 from impostor.model import Model
 from impostor.ptm.quantise import Ptm
 from impostor.shadow_projection import Ground
+from runtime.animation import AnimatedInstances
 from runtime.bump import Bump
-from runtime.checks import check_type, invertible
+from runtime.checks import check_number, check_type, check_whole, invertible, with_article
 from runtime.environments import RoomTable, check_rooms
 from runtime.gl_state import CallerState, preserved_state
-from runtime.grounds import GroundPass, GroundSurface, check_surface
+from runtime.grounds import GroundPass, GroundSurface
 from runtime.impostors import ImpostorPass
 from runtime.instances import Instances, Viewer
 from runtime.light_settings import LightSettings
@@ -33,6 +34,7 @@ from runtime.placed import Placed
 from runtime.rooms import RoomPass, number_of, to_show
 from runtime.shadows import ShadowPass
 from runtime.surfaces import Surface, SurfacePass
+from runtime.tiles import TileCache
 
 
 class ImpostorRenderer(LightSettings):
@@ -63,6 +65,9 @@ class ImpostorRenderer(LightSettings):
         How many of the brightest lights of each room cast shadows; 0 for none.
     contact_shadows : ContactShadows or None
         Whether `draw_shadows` also darkens the ground around the feet of what stands on it, and how.
+    view_fade_seconds : float
+        The longest that a copy takes from one view of its fan to the next, its pixels dealt out between the two; 0
+        switches at once, as does a renderer that is not told the time. See `advance`.
 
     Examples
     --------
@@ -74,6 +79,8 @@ class ImpostorRenderer(LightSettings):
 
     def __init__(self, ctx: moderngl.Context, cache_side: int = 4096):
         super().__init__()
+        check_type("ctx", ctx, moderngl.Context, " of moderngl")
+        check_whole("cache_side", cache_side, 1, TileCache.largest(ctx))
         self._ctx, self._released = ctx, False
         with preserved_state(ctx):
             self._impostors = ImpostorPass(ctx, cache_side)
@@ -193,22 +200,34 @@ class ImpostorRenderer(LightSettings):
         self._surfaces.append(surface)
         return surface
 
-    def remove(self, placed: Instances | MeshInstance | Surface) -> None:
-        """Take copies, a mesh or a surface away again; what is on the GPU goes with the last that needs it."""
-        if any(surface is placed for surface in self._surfaces):
-            self._surfaces = [surface for surface in self._surfaces if surface is not placed]
+    def remove(self, placed: Instances | MeshInstance | Surface | AnimatedInstances) -> None:
+        """Take something away again; what is on the GPU goes with the last that needs it.
+
+        Raises
+        ------
+        SettingsError
+            What is not in this renderer, or not any more.
+        """
+        self._check_in_use()
+        parts = placed.poses if isinstance(placed, AnimatedInstances) else (placed,)
+        for part in parts:
+            if not self._placed.holds(part) and not any(surface is part for surface in self._surfaces):
+                expected = "something that was added to this renderer and not taken away since"
+                raise SettingsError("remove", f"{with_article(type(placed))}; expected {expected}")
+        with preserved_state(self._ctx):
+            self._surfaces = [surface for surface in self._surfaces if all(surface is not part for part in parts)]
             self._surface_pass.prepare(self._surfaces)
-        for fan in self._placed.remove(placed):
-            self._impostors.forget()
-            self._shadows.forget(fan)
+            for fan in (fan for part in parts for fan in self._placed.remove(part)):
+                self._impostors.forget()
+                self._shadows.forget(fan)
 
     def advance(self, seconds: float) -> None:
         """Tell the time that has passed since the last frame, once a frame, before it is drawn.
 
         The next `draw` chooses the levels of detail for its viewer and carries crossfades on by so much; more draws of
         the same frame, for mirrors or other viewports, show the same levels. In a renderer that is never told the time
-        every draw chooses for itself, and levels change at once. Infinitely many seconds end all crossfades, as after
-        a cut to another camera.
+        every draw chooses for itself, and levels and views change at once. Infinitely many seconds end all crossfades,
+        as after a cut to another camera.
 
         Parameters
         ----------
@@ -323,7 +342,7 @@ class ImpostorRenderer(LightSettings):
     ) -> None:
         """Draw a plane, lit by lights and rooms, for callers who have no ground of their own."""
         check_type("ground", ground, Ground)
-        check_surface(surface)
+        check_type("surface", surface, GroundSurface)
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
             self._update_lights("lit")
             self._ground_pass.draw(state, viewer, self._table, self._room_table, ground, surface)
@@ -377,6 +396,15 @@ class ImpostorRenderer(LightSettings):
         else:
             self._table.update(self.lights, self.ambient, self._rooms)
         self._room_table.update(self._rooms)
+
+    @property
+    def view_fade_seconds(self) -> float:
+        return self._impostors.view_fade_seconds
+
+    @view_fade_seconds.setter
+    def view_fade_seconds(self, seconds: float) -> None:
+        check_number("view_fade_seconds", "time", seconds, 0, 1e9)
+        self._impostors.view_fade_seconds = float(seconds)
 
     @property
     def statistics(self) -> dict[str, int]:

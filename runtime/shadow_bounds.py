@@ -68,7 +68,8 @@ def covered_cells(hulls: NDArray[np.float64], width: int, height: int) -> NDArra
         Column and row, from the lower left corner, of cells of `CELL` pixels a side.
     """
     w = hulls[..., 3:]
-    whole = (w <= 1e-9).any(axis=(1, 2))
+    # Beyond what numbers hold there is no telling where a shadow goes.
+    whole = (w <= 1e-9).any(axis=(1, 2)) | ~np.isfinite(hulls).all(axis=(1, 2))
     pixels = (hulls[..., :2] / np.where(w > 1e-9, w, 1.0) + 1) / 2 * (width, height)
     # Pixels that smoothed edges reach farther.
     low, high = pixels.min(axis=1) - EDGE, pixels.max(axis=1) + EDGE

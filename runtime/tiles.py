@@ -14,6 +14,7 @@ from runtime.gpu import check_texture_size
 # Copies in one cube of this part of the smallest room's smallest side share tiles: they are at most 1.4 % of it apart.
 CELL = 1 / 128
 GUTTER = 1  # texels around each tile
+SPARE = 64  # one in so many texels of a side is for gutters
 VIEW_BITS, LEVEL_BITS = 11, 4
 
 
@@ -46,7 +47,7 @@ class TileCache:
     """
 
     def __init__(self, ctx: moderngl.Context, side: int):
-        self.capacity, self.side = side, side + side // 64
+        self.capacity, self.side = side, side + side // SPARE
         check_texture_size(ctx, "tile cache", self.side, self.side)
         self.color = ctx.texture((self.side, self.side), 4)
         self.color.filter = (moderngl.LINEAR, moderngl.LINEAR)
@@ -60,6 +61,13 @@ class TileCache:
     def side_for(size: int) -> int:
         """The least `side` of a cache that holds tiles of some size."""
         return max(1 << (size + 2 * GUTTER - 1).bit_length(), 256)
+
+    @staticmethod
+    def largest(ctx: moderngl.Context) -> int:
+        """The largest `side` that the GPU can hold."""
+        limit = ctx.info["GL_MAX_TEXTURE_SIZE"]
+        # As much as the spare texels may take, and what rounding leaves.
+        return next(side for side in range(limit * SPARE // (SPARE + 1) + 1, 0, -1) if side + side // SPARE <= limit)
 
     def clear(self) -> None:
         """Give every place back."""

@@ -6,7 +6,8 @@ LIBRARY = ctypes.CDLL("libGL.so.1")
 
 SWITCHES = {
     "BLEND": 0x0BE2, "DEPTH_TEST": 0x0B71, "CULL_FACE": 0x0B44, "SCISSOR_TEST": 0x0C11, "STENCIL_TEST": 0x0B90,
-    "POLYGON_OFFSET_FILL": 0x8037, "POLYGON_OFFSET_LINE": 0x2A02, "POLYGON_SMOOTH": 0x0B41, "LINE_SMOOTH": 0x0B20,
+    "POLYGON_OFFSET_FILL": 0x8037, "POLYGON_OFFSET_LINE": 0x2A02, "POLYGON_OFFSET_POINT": 0x2A01,
+    "POLYGON_SMOOTH": 0x0B41, "LINE_SMOOTH": 0x0B20,
     "FRAMEBUFFER_SRGB": 0x8DB9, "RASTERIZER_DISCARD": 0x8C89, "SAMPLE_ALPHA_TO_COVERAGE": 0x809E,
     "SAMPLE_ALPHA_TO_ONE": 0x809F, "SAMPLE_COVERAGE": 0x80A0, "SAMPLE_MASK": 0x8E51, "MULTISAMPLE": 0x809D,
     "COLOR_LOGIC_OP": 0x0BF2, "DEPTH_CLAMP": 0x864F, "DITHER": 0x0BD0, "PRIMITIVE_RESTART": 0x8F9D,
@@ -77,6 +78,8 @@ def snapshot():
 def set_askew(textures, sampler):
     """Set whatever would spoil a pass that relied on the default; framebuffer and viewport stay as they are."""
     for name in ("CULL_FACE", "STENCIL_TEST", "POLYGON_OFFSET_FILL", "FRAMEBUFFER_SRGB", "COLOR_LOGIC_OP"):
+        gl("glEnable", SWITCHES[name])
+    for name in ("POLYGON_OFFSET_LINE", "POLYGON_OFFSET_POINT"):
         gl("glEnable", SWITCHES[name])
     for name in ("RASTERIZER_DISCARD", "SAMPLE_ALPHA_TO_COVERAGE", "DEPTH_CLAMP", "BLEND"):
         gl("glEnable", SWITCHES[name])

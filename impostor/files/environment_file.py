@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from impostor.checks import check_type
 from impostor.environment import Environment
 from impostor.environment.environment import FACE_SIZES, is_face_size
 from impostor.environment.panorama import (
@@ -28,6 +29,7 @@ from impostor.files.cube_files import (
 )
 from impostor.files.output import atomic_output, check_output
 from impostor.files.radiance_file import WRITTEN, FilePath, picture_size, read_radiance, write_radiance
+from impostor.paths import check_path
 
 
 def read_environment(
@@ -73,6 +75,7 @@ def read_environment(
     SettingsError
         A size or an exposure that cannot be.
     """
+    check_path(path)
     if size is not None and not is_face_size(size):
         raise SettingsError("size", f"{size}; expected {FACE_SIZES}")
     if not 0 < exposure < np.inf:
@@ -116,6 +119,8 @@ def write_environment(path: FilePath, environment: Environment, *, force: bool =
     -----
     .exr keeps float32; .hdr 8 bits of mantissa; .png 8 bits on the sRGB curve, light from 0 to 1.
     """
+    check_path(path)
+    check_type("environment", environment, Environment)
     files = output_files(path, force)
     made = None if files[0].parent.exists() else files[0].parent
     pictures = (

@@ -13,6 +13,7 @@ from typing import Any
 
 from impostor.errors import FanFileError
 from impostor.files.fan_manifest import MAX_MANIFEST_BYTES, Manifest, check_version, parse_manifest
+from impostor.paths import check_path
 
 FilePath = str | PathLike[str]
 MAX_ENTRIES = 64
@@ -30,6 +31,7 @@ def write_archive(path: FilePath, entries: dict[str, bytes]) -> None:
 @contextmanager
 def open_archive(path: FilePath) -> Iterator[tuple[zipfile.ZipFile, Manifest]]:
     """The archive, found to hold what its manifest says and nothing else, and the manifest."""
+    check_path(path)
     if not os.path.isfile(path):  # a pipe would wait for ever
         raise FanFileError(path, "no such file; expected a .fan")
     with ExitStack() as stack:

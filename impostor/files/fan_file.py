@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from impostor.checks import check_type
 from impostor.errors import FanFileError, SettingsError
 from impostor.fan import Fan
 from impostor.files.fan_archive import FilePath, open_archive, read_entry, write_archive
@@ -56,6 +57,7 @@ def write_fan(path: FilePath, fan: Fan, force: bool = False) -> int:
     SettingsError
         The fan breaks an invariant, so that it could not be read back.
     """
+    check_type("fan", fan, Fan, ", as bake_fan and impostor.load give")
     check_output(path, force)
     for problem in _texel_problems(fan):
         raise SettingsError(fan.name, problem)

@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from impostor.errors import OutputError
+from impostor.paths import check_path
 
 try:
     import fcntl
@@ -36,6 +37,7 @@ def check_output(path: str | os.PathLike[str], force: bool = False) -> None:
         The file exists and `force` is not given, it is something else than a file, or its directory is missing or
         cannot be written.
     """
+    check_path(path)
     final = Path(path)
     if final.is_dir():
         raise OutputError(path, "is a directory; expected a file name")

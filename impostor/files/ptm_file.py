@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from impostor.checks import check_type
 from impostor.errors import PtmFileError, SettingsError
 from impostor.files.output import atomic_output, check_output
 from impostor.files.ptm_header import (
@@ -24,6 +25,7 @@ from impostor.files.ptm_header import (
     trailer_bytes,
 )
 from impostor.files.ptm_planes import decode_planes, encode_planes
+from impostor.paths import check_path
 from impostor.ptm.polynomials import RGB_FROM_YCRCB, TERMS
 from impostor.ptm.quantise import WHITE, Ptm
 
@@ -48,6 +50,7 @@ def read_ptm(path: FilePath) -> Ptm:
     PtmFileError
         Anything in the file is not as PTM.md says. Nothing is allocated on the word of the header alone.
     """
+    check_path(path)
     data = _file_bytes(path)
     header = parse_header(data, path)
     trailer = parse_trailer(data, header.body + header.body_bytes, path)
@@ -116,6 +119,7 @@ def write_ptm(
     SettingsError
         No `.ptm` file can hold the PTM, or a choice is not one of those above.
     """
+    check_type("ptm", ptm, Ptm)
     check_output(path, force)
     if max(ptm.size) > LARGEST_SIDE:
         raise SettingsError(path, f"PTM is {ptm.size[0]} x {ptm.size[1]}; expected sides up to {LARGEST_SIDE}")

@@ -10,11 +10,11 @@ in vec3 back;                // world: the way along which the tile's depth coun
 in vec4 rectangle;           // the covered part of the tile: left, bottom, right, top in -1..1
 in vec3 place;               // x, y and side of the relit tile in the cache
 in vec4 depth;               // metres in front of the quad: at depth 0, from there to depth 1, and per unit of x and y
-in vec2 fan_part;            // of the dither, from and to: which pixels are drawn
+in vec2 part;            // of the dither, from and to: which pixels are drawn
 out vec2 v_uv;
 out vec2 v_clip;
 flat out vec2 v_step;
-flat out vec2 v_fan_part;
+flat out vec2 v_part;
 
 void main() {
     vec2 plane = mix(rectangle.xy, rectangle.zw, corner);
@@ -27,5 +27,5 @@ void main() {
     vec4 surface = gl_Position + (depth.x + dot(plane, depth.zw)) * metre;
     v_clip = vec2(0.5 * (surface.z + surface.w), surface.w);
     v_step = depth.y * vec2(0.5 * (metre.z + metre.w), metre.w);
-    v_fan_part = fan_part;
+    v_part = part;
 }

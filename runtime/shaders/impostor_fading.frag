@@ -4,6 +4,6 @@
 #include "crossfade.glsl"
 
 void main() {
-    if (!shows_fan()) discard;
+    if (!keeps_pixel()) discard;
     show_tile();
 }

@@ -6,7 +6,7 @@ in vec3 normal;
 in vec2 uv;
 in vec4 tint;  // sRGB curve, as stored
 in vec4 row_0, row_1, row_2;  // of the copy's world_from_model
-in float fan_share;           // of the pixels, in a crossfade
+in vec2 part;                 // of the dither, in a crossfade: which pixels are drawn
 in vec4 tangent;              // w: -1 where the picture is mirrored
 out vec3 v_world;
 out vec3 v_normal;
@@ -14,7 +14,7 @@ out vec3 v_tangent;
 flat out float v_mirrored;
 out vec2 v_uv;
 out vec4 v_tint;
-flat out vec2 v_fan_part;
+flat out vec2 v_part;
 
 void main() {
     vec4 point = vec4(position, 1.0);
@@ -25,5 +25,5 @@ void main() {
     v_mirrored = tangent.w;
     v_uv = uv;
     v_tint = vec4(mix(tint.rgb / 12.92, pow((tint.rgb + 0.055) / 1.055, vec3(2.4)), step(0.04045, tint.rgb)), tint.a);
-    v_fan_part = vec2(0.0, fan_share);
+    v_part = part;
 }

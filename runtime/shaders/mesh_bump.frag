@@ -8,7 +8,7 @@
 #include "crossfade.glsl"
 
 void main() {
-    if (shows_fan() || cut_out(v_uv, v_tint.a)) discard;
+    if (!keeps_pixel() || cut_out(v_uv, v_tint.a)) discard;
     vec3 toward_eye = toward_the_eye();
     color = mesh_color(seen_normal(bumped(v_normal), toward_eye), toward_eye, vec3(0.0), vec3(0.0), 0.0);
 }

@@ -9,7 +9,7 @@
 #include "crossfade.glsl"
 
 void main() {
-    if (shows_fan() || cut_out(v_uv, v_tint.a)) discard;
+    if (!keeps_pixel() || cut_out(v_uv, v_tint.a)) discard;
     vec3 toward_eye = toward_the_eye(), normal = seen_normal(v_normal, toward_eye);
     vec4 weights, chosen;
     choose_rooms(v_world, weights, chosen);

@@ -48,6 +48,10 @@ CALLS = {
     "add": lambda renderer: renderer.add(FAN, (0, 0, 3), gloss=Gloss(0.2)),
     "add a mesh": lambda renderer: renderer.add_mesh(MODEL),
     "add bumps": lambda renderer: renderer.add_mesh(CARD, bump=BUMP),
+    "take away": lambda renderer: [
+        renderer.remove(each)
+        for each in (*renderer._surfaces, *renderer._placed.meshes, *(x.instances for x in renderer._placed.batches))
+    ],
     "add a surface": lambda renderer: renderer.add_surface(PTM, rectangle(1, 1)),
 }
 PICTURE = ("ground", "surfaces", "shadows", "meshes", "fans", "rooms")

@@ -7,8 +7,12 @@ from impostor.errors import GpuError, SettingsError
 from impostor.lighting import DirectionalLight
 from impostor.shadow_projection import Ground
 from runtime import ImpostorRenderer
+from runtime.animation import AnimatedFan, AnimatedInstances
 from runtime.cameras import Camera
+from runtime.contact_shadows import ContactShadows
 from runtime.grounds import GroundSurface
+from runtime.surfaces import rectangle
+from tests.ptms import random_ptm
 from tests.solids import Box, Sphere, solid_fan, solid_model
 
 FAN = solid_fan(Sphere((0, 1, 0)), views=6, size=32)
@@ -168,12 +172,73 @@ class TestGround:
             renderer.draw_ground(*MATRICES, LEVEL, (0.5, 0.5, 0.5))
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("exponent", [8, 14, 18, 30, 38, 40, 160, 300, 308])
+@pytest.mark.parametrize("name", ["positions", "yaws", "scales"])
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_numbers_of_any_size_are_drawn_or_left_out(renderer, screen, name, exponent, sign):
+    renderer.lights = [SUN]
+    renderer.contact_shadows = ContactShadows(0.5)
+    copies = renderer.add(FAN, [(0, 0, 0), (1, 0, 0)])
+    # A scale below 0 is no copy; one that is next to nothing is a hard one.
+    getattr(copies, name)[0] = 10.0 ** (sign * exponent) if name == "scales" else sign * 10.0**exponent
+    for draw in DRAWS.values():
+        draw(renderer)
+    assert renderer.statistics["instances"] >= 1
+
+
+class TestRemoving:
+    UNKNOWN = "; expected something that was added to this renderer and not taken away since"
+
+    def place_all(self, renderer):
+        surface = renderer.add_surface(random_ptm(size=(16, 16)), rectangle(1, 1))
+        return [
+            renderer.add(FAN),
+            renderer.add_mesh(MODEL),
+            surface,
+            AnimatedInstances(renderer, AnimatedFan([FAN], 1)),
+        ]
+
+    def test_whatever_was_placed_is_taken_away_once(self, renderer, screen):
+        things = self.place_all(renderer)
+        for thing in things:
+            renderer.remove(thing)
+        for draw in (renderer.draw, renderer.draw_meshes, renderer.draw_surfaces):
+            draw(*MATRICES)
+        assert not screen.color().any()
+        for thing in things:
+            with pytest.raises(SettingsError, match=f"^remove: an? {type(thing).__name__}{self.UNKNOWN}$"):
+                renderer.remove(thing)
+
+    @pytest.mark.parametrize("thing", [None, "tree", 3, FAN, MODEL, []])
+    def test_what_was_never_placed_is_refused(self, renderer, thing):
+        with pytest.raises(SettingsError, match=f"^remove: an? {type(thing).__name__}{self.UNKNOWN}$"):
+            renderer.remove(thing)
+
+    def test_what_another_renderer_has_stays_there(self, ctx, renderer):
+        other = ImpostorRenderer(ctx, cache_side=256)
+        try:
+            for thing in self.place_all(other):
+                with pytest.raises(SettingsError, match=self.UNKNOWN):
+                    renderer.remove(thing)
+                other.remove(thing)
+        finally:
+            other.release()
+
+    def test_an_animation_takes_itself_away(self, renderer):
+        dancer = AnimatedInstances(renderer, AnimatedFan([FAN, FAN], 1))
+        dancer.remove()
+        assert not renderer._placed.batches
+        with pytest.raises(SettingsError, match=self.UNKNOWN):
+            dancer.remove()
+
+
 def test_a_released_renderer_says_so(ctx, screen):
     renderer = ImpostorRenderer(ctx, cache_side=256)
-    renderer.add(FAN)
+    copies = renderer.add(FAN)
     renderer.release()
     for use in (*DRAWS.values(), lambda renderer: renderer.add(FAN), lambda renderer: renderer.add_mesh(MODEL),
-                lambda renderer: renderer.memory):  # fmt: skip
+                lambda renderer: renderer.memory, lambda renderer: renderer.remove(copies)):  # fmt: skip
         with pytest.raises(GpuError) as caught:
             use(renderer)
         assert problem(caught) == "ImpostorRenderer: has been released; expected one that is in use"

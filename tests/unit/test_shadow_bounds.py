@@ -49,6 +49,14 @@ def test_what_casts_outside_of_the_picture_is_left_out():
     assert in_view(hulls).tolist() == [False, True, True, False]
 
 
+@pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf])
+def test_a_shadow_that_numbers_cannot_hold_may_be_anywhere(number):
+    hulls = np.zeros((2, 8, 4)) + (0, 0, 0, 1)
+    hulls[1, 3, 0] = number
+    with np.errstate(all="raise"):
+        assert len(covered_cells(hulls, WIDTH, HEIGHT)) == -(-WIDTH // CELL) * -(-HEIGHT // CELL)
+
+
 def test_a_small_shadow_takes_few_cells():
     light, ground = DirectionalLight.from_angles(0, 60), Ground((0, 1, 0), 0.0)
     clip_from_world = np.linalg.multi_dot(filling(10.0, 0.0, 1.0))
