@@ -261,7 +261,7 @@ class _SceneReader:
         moved = np.einsum("nij,nj->ni", blended[..., :3], positions) + blended[..., 3]
         if normals is not None:
             normals = np.einsum("nij,nj->ni", normal_matrix(blended[..., :3]), normals)
-        return moved.astype(np.float32), normals
+        return moved, normals
 
     def _joint_matrices(self, skin: Skin, place: str) -> np.ndarray:
         """World from bind space for each joint, (J, 3, 4)."""
