@@ -15,7 +15,7 @@ import typer
 
 from impostor.errors import ImpostorError, ImpostorWarning, OutputError, SettingsError
 from impostor.files.output import check_output
-from impostor.stopping import stoppable
+from impostor.stopping import check_stopped, stoppable
 
 INTERRUPTED = 130  # what Typer, and every shell, makes of Ctrl-C
 EPILOG = "Exit codes: 0 done, 1 failed, 2 wrong usage. Angles are in degrees, azimuth from +Z toward +X."
@@ -243,10 +243,10 @@ def _flag(parameter: str) -> str:
 def progress_bar(label: str, quiet: bool = False) -> Iterator[Callable[[int, int], None]]:
     """A function to call with steps done and steps in all, which draws a bar on standard error.
 
-    Silent when told so, and where standard error is not a terminal.
+    Silent when told so, and where standard error is not a terminal. A command can be stopped at every step.
     """
     if quiet or not sys.stderr.isatty():
-        yield lambda done, total: None
+        yield lambda done, total: check_stopped()
         return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -254,7 +254,12 @@ def progress_bar(label: str, quiet: bool = False) -> Iterator[Callable[[int, int
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(label, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+        def step(done: int, total: int) -> None:
+            check_stopped()
+            bar.update(task, completed=done, total=total)
+
+        yield step
 
 
 @contextmanager

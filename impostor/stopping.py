@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+_signals: list[int] = []  # of the command that runs
+
 
 @contextmanager
 def stoppable() -> Iterator[list[int]]:
@@ -22,7 +24,9 @@ def stoppable() -> Iterator[list[int]]:
         Numbers of the signals that have come. Always empty outside the main thread, which alone gets signals; a signal
         that is ignored, as under nohup, stays so, and a caller's own handler stays in force.
     """
+    global _signals
     come: list[int] = []
+    _signals, outer = come, _signals
 
     def stop(number: int, frame: FrameType | None) -> None:
         come.append(number)
@@ -36,5 +40,12 @@ def stoppable() -> Iterator[list[int]]:
     try:
         yield come
     finally:
+        _signals = outer
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def check_stopped() -> None:
+    """Raise KeyboardInterrupt again if a library has swallowed it, as those do that catch all that an import raises."""
+    if _signals:
+        raise KeyboardInterrupt
