@@ -41,7 +41,7 @@ class Primitive:
     normals : ndarray, (N, 3) float32
         Unit.
     uvs : ndarray, (N, 2) float32, or None
-        u right, v down from the picture's top row (v = 0 is row 0); the picture repeats.
+        u right, v down from the picture's top row (v = 0 is row 0); beyond it as the material says.
     colors : ndarray, (N, 4) uint8, or None
         sRGB colour and linear alpha.
     triangles : ndarray, (M, 3) uint32

@@ -69,6 +69,7 @@ class MeshPart:
             check_texture_size(ctx, self.material.name, width, height)
             pixels = np.ascontiguousarray(self.material.texture).tobytes()
             self._own = self.texture = ctx.texture((width, height), 4, pixels, internal_format=SRGB8_ALPHA8)
+            self.texture.repeat_x, self.texture.repeat_y = (not clamp for clamp in self.material.clamp)
             self.texture.build_mipmaps()
             self.texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
 
