@@ -123,12 +123,13 @@ def default_samples(model: Model) -> int:
 
 
 def _primitives(model: Model, origin: NDArray[Any]) -> list[_Primitive]:
-    textures: dict[int, _Texture] = {}
+    textures: dict[tuple[int, tuple[bool, bool]], _Texture] = {}
     primitives = []
     for primitive in model.primitives:
         texture, pixels = None, primitive.material.texture
         if pixels is not None and primitive.uvs is not None:
-            texture = textures.setdefault(id(pixels), _Texture(pixels))
+            clamp = primitive.material.clamp
+            texture = textures.setdefault((id(pixels), clamp), _Texture(pixels, clamp))
         primitives.append(_Primitive(primitive, _Material(primitive.material, texture), origin))
     return primitives
 
@@ -139,9 +140,9 @@ class _Texture(pyrender.Texture):
     Not anisotropic: in software that triples the time for 0.8 dB, where 4 samples instead of 2 give 8 dB.
     """
 
-    def __init__(self, pixels: NDArray[np.uint8]):
+    def __init__(self, pixels: NDArray[np.uint8], clamp: tuple[bool, bool]):
         super().__init__()
-        self.pixels = np.ascontiguousarray(pixels)
+        self.pixels, self._clamp = np.ascontiguousarray(pixels), clamp
 
     def _add_to_context(self):
         height, width = self.pixels.shape[:2]
@@ -159,8 +160,8 @@ class _Texture(pyrender.Texture):
         GL.glGenerateMipmap(target)
         GL.glTexParameteri(target, GL.GL_TEXTURE_MAG_FILTER, GL.GL_LINEAR)
         GL.glTexParameteri(target, GL.GL_TEXTURE_MIN_FILTER, GL.GL_LINEAR_MIPMAP_LINEAR)
-        GL.glTexParameteri(target, GL.GL_TEXTURE_WRAP_S, GL.GL_REPEAT)
-        GL.glTexParameteri(target, GL.GL_TEXTURE_WRAP_T, GL.GL_REPEAT)
+        for axis, clamp in zip((GL.GL_TEXTURE_WRAP_S, GL.GL_TEXTURE_WRAP_T), self._clamp, strict=True):
+            GL.glTexParameteri(target, axis, GL.GL_CLAMP_TO_EDGE if clamp else GL.GL_REPEAT)
 
 
 class _Material(pyrender.Material):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import moderngl
@@ -69,9 +69,3 @@ def _calls_a_sample(job: Callable[[], object], finish: Callable[[], object], war
         finish()
         fastest = min(fastest, time.perf_counter() - start)
     return int(np.clip(SHORTEST_SAMPLE / max(fastest, 1e-7), 1, 1000))
-
-
-def median_seconds(jobs: Sequence[Callable[[], object]], repeats: int = REPEATS) -> list[float]:
-    """Seconds of each of some jobs on the CPU."""
-    times = alternate(*jobs, repeats=repeats)
-    return [times.median(index) for index in range(len(jobs))]

@@ -1,9 +1,8 @@
 """What an impostor is: the fan, its files and the arithmetic that bake and runtime share."""
 
-from typing import TYPE_CHECKING
-
 from impostor.lazy import lazy_names
 
+TYPE_CHECKING = False  # as type checkers know it; `typing` takes longer to import than Ctrl-C should have to wait
 if TYPE_CHECKING:
     from impostor.environment import Environment, Reflection, Room
     from impostor.errors import ImpostorError

@@ -15,6 +15,7 @@ import typer
 
 from impostor.errors import ImpostorError, ImpostorWarning, OutputError, SettingsError
 from impostor.files.output import check_output
+from impostor.stopping import check_stopped, stoppable
 
 INTERRUPTED = 130  # what Typer, and every shell, makes of Ctrl-C
 EPILOG = "Exit codes: 0 done, 1 failed, 2 wrong usage. Angles are in degrees, azimuth from +Z toward +X."
@@ -53,32 +54,43 @@ def main(arguments: list[str] | None = None) -> int:
     int
         The exit code.
     """
-    arguments = sys.argv[1:] if arguments is None else arguments
+    with stoppable() as signals:
+        try:
+            code, lines = _outcome(sys.argv[1:] if arguments is None else arguments)
+        except Exception:
+            if not signals:
+                raise
+            code, lines = 1, []
+    if code and signals:
+        code, lines = 128 + signals[0], ["stopped"]
+    for line in lines:
+        print(f"impostor: {line}", file=sys.stderr)
+    return code
+
+
+def _outcome(arguments: list[str]) -> tuple[int, list[str]]:
+    """The exit code of one command, and what is to be said on standard error at its end."""
     notices: list[str] = []
     try:
         command = typer.main.get_command(make_app())
         with _held_warnings(notices):
             code = command.main(arguments or ["--help"], "impostor", standalone_mode=False) or 0
-        if code == INTERRUPTED:
-            return _fail("stopped", INTERRUPTED)
-        for notice in notices:
-            print(f"impostor: warning: {notice}", file=sys.stderr)
-        return code
+        return code, ["stopped"] if code == INTERRUPTED else [f"warning: {notice}" for notice in notices]
     except SettingsError as error:
-        return _fail(str(error), 2)
+        return 2, [str(error)]
     except ImpostorError as error:
-        return _fail(str(error), 1)
+        return 1, [str(error)]
     except typer.TyperException as error:
-        return _fail(_usage_problem(error), 2)
+        return 2, [_usage_problem(error)]
     except (KeyboardInterrupt, typer.Abort):
-        return _fail("stopped", INTERRUPTED)
+        return INTERRUPTED, ["stopped"]
     except MemoryError:
-        return _fail("not enough memory; smaller or fewer pictures take less", 1)
+        return 1, ["not enough memory; smaller or fewer pictures take less"]
     except BrokenPipeError:
         sys.stderr.close()  # whoever read our output has gone
-        return 1
+        return 1, []
     except OSError as error:
-        return _fail(f"{error.filename or 'system'}: {error.strerror or error}", 1)
+        return 1, [f"{error.filename or 'system'}: {error.strerror or error}"]
 
 
 def make_app() -> typer.Typer:
@@ -231,10 +243,10 @@ def _flag(parameter: str) -> str:
 def progress_bar(label: str, quiet: bool = False) -> Iterator[Callable[[int, int], None]]:
     """A function to call with steps done and steps in all, which draws a bar on standard error.
 
-    Silent when told so, and where standard error is not a terminal.
+    Silent when told so, and where standard error is not a terminal. A command can be stopped at every step.
     """
     if quiet or not sys.stderr.isatty():
-        yield lambda done, total: None
+        yield lambda done, total: check_stopped()
         return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -242,7 +254,12 @@ def progress_bar(label: str, quiet: bool = False) -> Iterator[Callable[[int, int
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(label, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+        def step(done: int, total: int) -> None:
+            check_stopped()
+            bar.update(task, completed=done, total=total)
+
+        yield step
 
 
 @contextmanager
@@ -264,8 +281,3 @@ def _usage_problem(error: typer.TyperException) -> str:
         message = f"{error.param.opts[0]}: {problem['input']!r}; expected {expected}"
     context = getattr(error, "ctx", None)
     return f"{message} (see {context.command_path if context else 'impostor'} --help)"
-
-
-def _fail(message: str, code: int) -> int:
-    print(f"impostor: {message}", file=sys.stderr)
-    return code

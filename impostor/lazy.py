@@ -1,9 +1,14 @@
 """Public names that are imported when they are first asked for: whoever needs few of them waits for few."""
 
+from __future__ import annotations
+
 import sys
-from collections.abc import Callable
 from importlib import import_module
-from typing import Any
+
+TYPE_CHECKING = False  # see `impostor/__init__.py`
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
 
 
 def lazy_names(package: str, homes: dict[str, str]) -> Callable[[str], Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -9,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from impostor.errors import ModelError, SettingsError
+from impostor.errors import ModelError, ModelWarning, SettingsError
 from impostor.importing.checks import CHECKS, prepared
+from impostor.importing.distance import Distance
 from impostor.importing.gltf_scene import read_gltf
 from impostor.importing.materials import Material
 from impostor.importing.mesh_parts import imported_parts
@@ -35,11 +37,12 @@ class Primitive:
     Attributes
     ----------
     positions : ndarray, (N, 3) float32
-        Metres.
+        Metres. Of a model that is many times its size away from the origin float64: there 32 bits would round its shape
+        away, and who hands them on in 32 bits takes the middle of `Model.bounds` off first.
     normals : ndarray, (N, 3) float32
         Unit.
     uvs : ndarray, (N, 2) float32, or None
-        u right, v down from the picture's top row (v = 0 is row 0); the picture repeats.
+        u right, v down from the picture's top row (v = 0 is row 0); beyond it as the material says.
     colors : ndarray, (N, 4) uint8, or None
         sRGB colour and linear alpha.
     triangles : ndarray, (M, 3) uint32
@@ -209,14 +212,19 @@ def _assembled(where, name: str, parts: list[Part], crease: float, welded=True, 
     if total > MOST_TRIANGLES:
         raise ModelError(where, f"{total} triangles with all instances, expected at most {MOST_TRIANGLES}")
     by_material: dict[int, list[Part]] = {}
-    for part in parts:
-        with np.errstate(all="ignore"):
-            ready = finished_part(where, checked(where, part), crease, welded)
-        if ready is not None:
-            by_material.setdefault(id(ready.material), []).append(ready)
+    with np.errstate(all="ignore"):
+        distance = Distance([checked(where, part) for part in parts])
+        for part in parts:
+            ready = finished_part(where, part, distance, crease, welded)
+            if ready is not None:
+                by_material.setdefault(id(ready.material), []).append(ready)
     if not by_material:
         found = f"{total} triangles, none of any area" if total else "no triangles"
-        raise ModelError(where, f"{found}, expected at least one to draw")
+        reason = f": {distance.problem}" if total and distance.problem else ""
+        raise ModelError(where, f"{found}{reason}; expected at least one to draw")
+    if distance.problem:
+        coarse = f"{distance.problem}, coarse for its size of {distance.size:.3g} m"
+        warnings.warn(ModelWarning(f"{where}: {coarse}; expected it nearer to the origin"), stacklevel=3)
     return Model(name, tuple(_primitive(joined(group)) for group in by_material.values()), source_hash)
 
 
@@ -224,7 +232,7 @@ def _primitive(part: Part) -> Primitive:
     assert part.normals is not None
     uvs = part.uvs
     return Primitive(
-        np.ascontiguousarray(part.positions, np.float32),
+        np.ascontiguousarray(part.positions),
         np.ascontiguousarray(part.normals, np.float32),
         None if uvs is None else np.ascontiguousarray(uvs, np.float32),
         None if part.colors is None else np.ascontiguousarray(part.colors, np.uint8),

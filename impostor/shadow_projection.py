@@ -258,6 +258,8 @@ def shadow_on_ground(
 ) -> NDArray[np.float64]:
     """The shadow's vertices on the ground, lined up with the quad as the viewer sees it.
 
+    The reference for `runtime/shaders/shadow_strips.vert`, which the tests hold against it; nothing is drawn with it.
+
     Parameters
     ----------
     strips : Strips

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -95,13 +96,15 @@ def model_summary(path: Path, up: str = "y") -> dict[str, Any]:
 
 
 def _ranges(bounds: NDArray[np.float64]) -> list[list[float]]:
-    """Least and greatest x, y and z."""
-    return [[_short(low), _short(high)] for low, high in bounds.T]
+    """Least and greatest x, y and z, as finely as the object is large: it may be far from the origin."""
+    size = float(np.ptp(bounds, axis=0).max())
+    return [[_short(low, size), _short(high, size)] for low, high in bounds.T.tolist()]
 
 
-def _short(metres: float) -> float:
-    """Rounded for reading, whatever its size."""
-    return float(f"{metres:.6g}")
+def _short(metres: float, size: float = np.inf) -> float:
+    """Rounded for reading: to six figures of its own, or of a size that is smaller."""
+    smaller = min(abs(metres), size)
+    return round(metres, 5 - math.floor(math.log10(smaller))) if smaller else metres
 
 
 def contact_sheet(fan: Fan) -> NDArray[np.uint8]:

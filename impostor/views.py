@@ -274,8 +274,10 @@ def frame(
     SettingsError
         The eye of a perspective camera stands inside the object's bounding sphere.
     """
+    points = points if points.dtype == np.float32 else np.asarray(points, float)
     middle = (points.min(axis=0).astype(float) + points.max(axis=0)) / 2
-    points = _outermost(np.asarray(points, np.float32) - middle.astype(np.float32))
+    # Of points of 64 bits, 32 are enough only once the middle is taken off.
+    points = _outermost((points - middle.astype(points.dtype)).astype(np.float32))
     reach = float(np.sqrt(np.einsum("ij,ij->i", points, points).max())) or 1.0
     if not distance > reach * 1.05:
         raise SettingsError("distance", f"{distance:g} m; expected more than {reach * 1.05:.4g} m for this object")

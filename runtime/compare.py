@@ -19,6 +19,7 @@ from impostor.views import direction
 from runtime.cameras import FRAME_MARGIN, Camera
 from runtime.light_settings import DEFAULT_AMBIENT, DEFAULT_LIGHTS
 from runtime.offscreen import Offscreen
+from runtime.recentring import moved_camera, recentred
 from runtime.renderer import ImpostorRenderer
 
 BACKGROUND = (0.4, 0.5, 0.6, 1.0)
@@ -109,17 +110,18 @@ class Comparison:
     ):
         size = fan.size if size is None else size
         self._fan, self._sphere = fan, (model.bounds.mean(axis=0), model.radius)
+        (drawn_fan, fan_middle), (drawn_model, self._middle) = recentred(fan), recentred(model)
         self._fans, self._meshes = ImpostorRenderer(ctx), ImpostorRenderer(ctx)
         for renderer in (self._fans, self._meshes):
             renderer.lights, renderer.ambient = lights, ambient
-        self._fans.add(fan)
-        self._meshes.add_mesh(model)
+        self._fans.add(drawn_fan, fan_middle - self._middle)
+        self._meshes.add_mesh(drawn_model)
         self._impostor = Offscreen(ctx, size, size)
         self._truth = Offscreen(ctx, size, size, MESH_SAMPLES)
 
     def pair(self, azimuth: float, elevation: float) -> Pair:
         """Both pictures from one camera (radians), on nothing; it has the perspective of the fan's own cameras."""
-        matrices = self._camera(azimuth, elevation).matrices
+        matrices = moved_camera(self._camera(azimuth, elevation), self._middle).matrices
         self._truth.clear()
         self._meshes.draw_meshes(*matrices)
         self._impostor.clear()

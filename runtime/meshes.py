@@ -42,12 +42,16 @@ COPY_FORMATS = {"row_0": ("4f", "16x"), "row_1": ("4f", "16x"), "row_2": ("4f", 
 
 
 class MeshPart:
-    """One primitive on the GPU, with tangents (N, 4) where it has them: its buffers and its texture."""
+    """One primitive on the GPU, with tangents (N, 4) where it has them: its buffers and its texture.
+
+    Its positions are those of the primitive less `origin`.
+    """
 
     def __init__(
         self,
         ctx: moderngl.Context,
         primitive: Primitive,
+        origin: NDArray[np.float64],
         white: moderngl.Texture,
         tangents: NDArray[np.float32] | None = None,
     ):
@@ -55,7 +59,7 @@ class MeshPart:
         vertices = np.zeros(len(primitive.positions), VERTEX_DTYPE if tangents is None else BUMPED_DTYPE)
         if tangents is not None:
             vertices["tangent"] = tangents
-        vertices["position"], vertices["normal"] = primitive.positions, primitive.normals
+        vertices["position"], vertices["normal"] = primitive.positions - origin, primitive.normals
         vertices["uv"] = 0 if primitive.uvs is None else primitive.uvs
         vertices["tint"] = 255 if primitive.colors is None else primitive.colors
         self.vertices = ctx.buffer(vertices.tobytes())
@@ -66,6 +70,7 @@ class MeshPart:
             check_texture_size(ctx, self.material.name, width, height)
             pixels = np.ascontiguousarray(self.material.texture).tobytes()
             self._own = self.texture = ctx.texture((width, height), 4, pixels, internal_format=SRGB8_ALPHA8)
+            self.texture.repeat_x, self.texture.repeat_y = (not clamp for clamp in self.material.clamp)
             self.texture.build_mipmaps()
             self.texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
 
@@ -85,6 +90,12 @@ class MeshBuffers:
     model : Model
     bump : Bump, optional
 
+    Attributes
+    ----------
+    origin : ndarray, (3,) float64
+        What the buffers' positions are relative to, in model space: a model that its file has put far away keeps its
+        shape in 32 bits about its own middle only.
+
     Raises
     ------
     SettingsError
@@ -95,9 +106,11 @@ class MeshBuffers:
         self.model, self.bump = model, bump
         parts = model.primitives
         prepared = [(part, None) if bump is None else with_tangents(model.name, part) for part in parts]
+        far = any(part.positions.dtype == np.float64 for part in parts)
+        self.origin = model.bounds.mean(axis=0) if far else np.zeros(3)
         self.bumps = None if bump is None else bump_texture(ctx, bump)
         self._white = ctx.texture((1, 1), 4, b"\xff\xff\xff\xff")
-        self.parts = [MeshPart(ctx, part, self._white, tangents) for part, tangents in prepared]
+        self.parts = [MeshPart(ctx, part, self.origin, self._white, tangents) for part, tangents in prepared]
         self._arrays: dict[tuple[int, int | None], list[moderngl.VertexArray]] = {}
         self.triangle_count = model.triangle_count
 
@@ -230,9 +243,11 @@ class MeshCopies:
         return MeshCopies(self.buffers, self.gloss, self.world_from_model[index], parts, self.reflection)
 
     def records(self) -> NDArray[np.void]:
-        """As (N,) COPY_DTYPE."""
-        rows = np.zeros((len(self.world_from_model), COPY_DTYPE.itemsize // 4), np.float32)
-        rows[:, :12] = self.world_from_model[:, :3].reshape(-1, 12)
+        """As (N,) COPY_DTYPE: they place the buffers' positions."""
+        placed = self.world_from_model[:, :3].copy()
+        placed[:, :, 3] += placed[:, :, :3] @ self.buffers.origin
+        rows = np.zeros((len(placed), COPY_DTYPE.itemsize // 4), np.float32)
+        rows[:, :12] = placed.reshape(-1, 12)
         rows[:, 12:14] = WHOLE if self.parts is None else self.parts
         return rows.view(COPY_DTYPE)[:, 0]
 

@@ -20,6 +20,7 @@ from runtime.cameras import Camera
 from runtime.grounds import GroundSurface
 from runtime.light_settings import DEFAULT_AMBIENT, DEFAULT_LIGHTS
 from runtime.offscreen import Offscreen
+from runtime.recentring import moved_camera, moved_room, recentred
 from runtime.renderer import ImpostorRenderer
 
 OUTPUTS = ("lit", "albedo", "normal", "depth", "alpha")
@@ -113,10 +114,13 @@ def draw_picture(
     """
     if isinstance(subject, Fan):
         _warn_of_elevation(subject, camera)
+    subject, middle = recentred(subject)
+    camera = moved_camera(camera, middle)
     target = Offscreen(ctx, settings.width, settings.height, MESH_SAMPLES if isinstance(subject, Model) else 1)
     renderer = ImpostorRenderer(ctx)
     try:
-        renderer.lights, renderer.ambient, renderer.rooms = settings.lights, settings.ambient, settings.rooms
+        renderer.lights, renderer.ambient = settings.lights, settings.ambient
+        renderer.rooms = [moved_room(room, middle) for room in settings.rooms]
         add = renderer.add_mesh if isinstance(subject, Model) else renderer.add
         add(subject, gloss=settings.gloss, reflection=settings.reflection)  # type: ignore[arg-type]
         lit = settings.output == "lit"

@@ -121,10 +121,16 @@ class TextureInfo(_Object, kw_only=True):
 class _Pbr(_Object):
     base_color_factor: Vec4 = (1.0, 1.0, 1.0, 1.0)
     base_color_texture: TextureInfo | None = None
+    metallic_factor: float = 1.0
+    roughness_factor: float = 1.0
+    metallic_roughness_texture: Any = None
 
 
 class GltfMaterial(_Object):
     pbr_metallic_roughness: _Pbr = msgspec.field(default_factory=_Pbr)
+    emissive_factor: Vec3 = (0.0, 0.0, 0.0)
+    normal_texture: Any = None
+    occlusion_texture: Any = None
     alpha_mode: str = "OPAQUE"
     alpha_cutoff: float = 0.5
     double_sided: bool = False
@@ -331,6 +337,11 @@ class Gltf:
         values = values.copy()
         values[indices] = replacements
         return values
+
+
+def floats(values: np.ndarray) -> np.ndarray:
+    """Numbers of any kind as float32."""
+    return np.ascontiguousarray(values, np.float32)
 
 
 def _normalised(values: np.ndarray) -> np.ndarray:

@@ -1,21 +1,19 @@
-"""The scene of a glTF file as parts: nodes, meshes, skins, morph targets and materials."""
+"""The scene of a glTF file as parts: nodes, meshes, skins and morph targets."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import Any
 
-import msgspec
 import numpy as np
 
-from impostor.importing.gltf import Gltf, GltfMaterial, Primitive, Skin, TextureInfo, Vec2
-from impostor.importing.materials import Material, decode_texture, finished, read_texture, warn
+from impostor.importing.gltf import Gltf, Primitive, Skin, floats
+from impostor.importing.gltf_materials import GltfMaterials
+from impostor.importing.materials import warn
 from impostor.importing.parts import MOST_TRIANGLES, Part, normal_matrix
 from impostor.importing.sources import ModelFiles
 from impostor.srgb import srgb_from_linear
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
-_REPEAT = 10497
 _READ_EXTENSIONS = {
     "EXT_texture_webp",
     "KHR_draco_mesh_compression",
@@ -25,7 +23,7 @@ _READ_EXTENSIONS = {
     "KHR_texture_basisu",
     "KHR_texture_transform",
 }
-# These change neither shape nor base colour.
+# These change neither shape nor base colour; of emission `GltfMaterials` tells.
 _HARMLESS_EXTENSIONS = {
     "KHR_animation_pointer",
     "KHR_lights_punctual",
@@ -48,28 +46,6 @@ _SEE_THROUGH_EXTENSIONS = {
 _GEOMETRY_EXTENSIONS = {"EXT_mesh_gpu_instancing", "EXT_meshopt_compression", "KHR_meshopt_compression"}
 
 
-class _Transform(msgspec.Struct, rename="camel"):
-    offset: Vec2 = (0.0, 0.0)
-    rotation: float = 0.0
-    scale: Vec2 = (1.0, 1.0)
-    tex_coord: int | None = None
-
-
-class _SpecularGlossiness(msgspec.Struct, rename="camel"):
-    diffuse_factor: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
-    diffuse_texture: TextureInfo | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class _Surface:
-    """A material and how its texture is reached from the vertices."""
-
-    material: Material
-    uv_set: int = 0
-    transform: _Transform | None = None
-    wraps: bool = True
-
-
 def read_gltf(files: ModelFiles, allow_missing_textures: bool) -> list[Part]:
     """Every triangle of the default scene, in rest pose.
 
@@ -85,11 +61,7 @@ class _SceneReader:
     def __init__(self, gltf: Gltf, allow_missing_textures: bool):
         self.gltf = gltf
         self.document = gltf.document
-        self.allow_missing_textures = allow_missing_textures
-        self.surfaces: dict[int | None, _Surface] = {
-            None: _Surface(Material(base_color=(1.0, 1.0, 1.0, 1.0), double_sided=False))
-        }
-        self.without_texture: dict[int, Material] = {}
+        self.materials = GltfMaterials(gltf, allow_missing_textures)
         self._check_extensions()
         self.worlds = self._world_from_nodes()
 
@@ -118,6 +90,7 @@ class _SceneReader:
                 self._check_total(total)
         if other_modes:
             warn(self.gltf.files, f"{other_modes} primitives of points or lines, not drawn")
+        self.materials.tell_what_is_not_drawn()
         if not shown:
             raise self.gltf.fail(
                 f"the scene shows none of its {len(self.document.meshes)} meshes, expected at least one"
@@ -176,15 +149,14 @@ class _SceneReader:
         positions = attribute("POSITION")
         if positions is None:
             raise self.gltf.fail(f"{place}: has no POSITION, expected one")
-        positions, normals = _floats(positions), attribute("NORMAL")
-        normals = None if normals is None else _floats(normals)
+        positions, normals = floats(positions), attribute("NORMAL")
+        normals = None if normals is None else floats(normals)
         positions = self._morphed(positions, "POSITION", primitive, weights, place)
         if normals is not None:
             normals = self._morphed(normals, "NORMAL", primitive, weights, place)
         if skin is not None:
             positions, normals = self._skinned(positions, normals, attribute, skin, place)
-        surface = self._surface(primitive.material)
-        material, uvs = self._uvs(surface, primitive, attribute, place)
+        material, uvs = self.materials.drawn(primitive, attribute, place)
         triangles = self._triangles(primitive, draco, len(positions), place)
         colors = attribute("COLOR_0")
         return Part(
@@ -226,7 +198,7 @@ class _SceneReader:
     ) -> np.ndarray:
         for weight, target in zip(weights, primitive.targets, strict=False):
             if weight and name in target:
-                delta = _floats(self.gltf.accessor(target[name], f"{place}.targets"))
+                delta = floats(self.gltf.accessor(target[name], f"{place}.targets"))
                 if delta.shape != base.shape:
                     raise self.gltf.fail(f"{place}: morph target has shape {delta.shape}, expected {base.shape}")
                 base = base + np.float32(weight) * delta
@@ -261,7 +233,7 @@ class _SceneReader:
         moved = np.einsum("nij,nj->ni", blended[..., :3], positions) + blended[..., 3]
         if normals is not None:
             normals = np.einsum("nij,nj->ni", normal_matrix(blended[..., :3]), normals)
-        return moved.astype(np.float32), normals
+        return moved, normals
 
     def _joint_matrices(self, skin: Skin, place: str) -> np.ndarray:
         """World from bind space for each joint, (J, 3, 4)."""
@@ -276,78 +248,6 @@ class _SceneReader:
             raise self.gltf.fail(f"{place}: {len(inverse_bind)} inverse bind matrices, expected {len(worlds)}")
         inverse_bind = inverse_bind[: len(worlds)].reshape(-1, 4, 4).transpose(0, 2, 1).astype(np.float64)
         return (worlds @ inverse_bind)[:, :3]
-
-    def _surface(self, index: int | None) -> _Surface:
-        if index not in self.surfaces:
-            material = self.gltf.item("materials", index or 0, "primitive")
-            self.surfaces[index] = self._read_surface(material, f"materials[{index}] '{material.name}'")
-        return self.surfaces[index]
-
-    def _read_surface(self, source: GltfMaterial, place: str) -> _Surface:
-        if source.alpha_mode not in ("OPAQUE", "MASK", "BLEND"):
-            raise self.gltf.fail(f"{place}: alphaMode '{source.alpha_mode}', expected OPAQUE, MASK or BLEND")
-        pbr = source.pbr_metallic_roughness
-        factor, info = pbr.base_color_factor, pbr.base_color_texture
-        if "KHR_materials_pbrSpecularGlossiness" in source.extensions:
-            gloss = self._extension(source, "KHR_materials_pbrSpecularGlossiness", _SpecularGlossiness, place)
-            factor, info = gloss.diffuse_factor, gloss.diffuse_texture
-        material = Material(
-            source.name or "default", factor, None, source.alpha_mode, source.alpha_cutoff, source.double_sided
-        )
-        if info is None:
-            return _Surface(finished(self.gltf.files, material))
-        texture, wraps = self._texture(info, place)
-        transform, uv_set = None, info.tex_coord
-        if "KHR_texture_transform" in info.extensions:
-            transform = self._extension(info, "KHR_texture_transform", _Transform, place)
-            uv_set = uv_set if transform.tex_coord is None else transform.tex_coord
-        return _Surface(finished(self.gltf.files, replace(material, texture=texture)), uv_set, transform, wraps)
-
-    def _extension(self, holder: Any, name: str, schema: Any, place: str) -> Any:
-        try:
-            return msgspec.convert(holder.extensions[name], schema, strict=False)
-        except msgspec.ValidationError as error:
-            raise self.gltf.fail(f"{place}: {name}: {error}") from error
-
-    def _texture(self, info: TextureInfo, place: str) -> tuple[np.ndarray | None, bool]:
-        """Pixels, and whether the sampler repeats them."""
-        texture = self.gltf.item("textures", info.index, place)
-        source = texture.extensions.get("EXT_texture_webp", {}).get("source", texture.source)
-        if source is None:
-            names = ", ".join(texture.extensions) or "no source"
-            raise self.gltf.fail(
-                f"{place}: textures[{info.index}] has only {names}, expected a PNG, JPEG or WebP image"
-            )
-        wraps = True
-        if texture.sampler is not None:
-            sampler = self.gltf.item("samplers", texture.sampler, f"textures[{info.index}]")
-            wraps = sampler.wrap_s == _REPEAT and sampler.wrap_t == _REPEAT
-        content, image_place = self.gltf.image(source, f"textures[{info.index}]")
-        if isinstance(content, str):
-            return read_texture(self.gltf.files, content, image_place, self.allow_missing_textures), wraps
-        return decode_texture(self.gltf.files, content, image_place), wraps
-
-    def _uvs(
-        self, surface: _Surface, primitive: Primitive, attribute: Any, place: str
-    ) -> tuple[Material, np.ndarray | None]:
-        """The primitive's material and its texture coordinates as the texture is to be sampled."""
-        material = surface.material
-        if material.texture is None:
-            return material, None
-        uvs = attribute(f"TEXCOORD_{surface.uv_set}")
-        if uvs is None:
-            warn(self.gltf.files, f"{place}: has no TEXCOORD_{surface.uv_set}, drawn without its texture")
-            plain = self.without_texture.setdefault(id(material), replace(material, texture=None))
-            return plain, None
-        uvs = _floats(uvs)
-        if surface.transform is not None:
-            uvs = _transformed(uvs, surface.transform)
-        if not surface.wraps and len(uvs) and (np.nanmin(uvs) < -1e-3 or np.nanmax(uvs) > 1.001):
-            warn(
-                self.gltf.files,
-                f"{place}: texture of '{material.name}' asks for clamping or mirroring, drawn repeating",
-            )
-        return material, uvs
 
 
 def _local(node: Any) -> np.ndarray:
@@ -366,18 +266,6 @@ def _local(node: Any) -> np.ndarray:
     local[:3, :3] = rotation * np.array(node.scale)
     local[:3, 3] = node.translation
     return local
-
-
-def _transformed(uvs: np.ndarray, transform: _Transform) -> np.ndarray:
-    """KHR_texture_transform: scale, then turn counter-clockwise on the picture (v runs down), then shift."""
-    u, v = (uvs * np.array(transform.scale)).T
-    cos, sin = np.cos(transform.rotation), np.sin(transform.rotation)
-    turned = np.column_stack([cos * u + sin * v, -sin * u + cos * v])
-    return (turned + np.array(transform.offset)).astype(np.float32)
-
-
-def _floats(values: np.ndarray) -> np.ndarray:
-    return np.ascontiguousarray(values, np.float32)
 
 
 def _srgb_colors(colors: np.ndarray, alpha_mode: str) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import warnings
 from dataclasses import dataclass, replace
 
@@ -39,6 +40,8 @@ class Material:
     alpha_cutoff : float
         For MASK: covered where alpha is at least this.
     double_sided : bool
+    clamp : tuple of bool
+        Whether the picture's edge goes on beyond it along u and along v; else the picture repeats.
     """
 
     name: str = "default"
@@ -47,6 +50,7 @@ class Material:
     alpha_mode: str = "OPAQUE"
     alpha_cutoff: float = 0.5
     double_sided: bool = True
+    clamp: tuple[bool, bool] = (False, False)
 
 
 def warn(files: ModelFiles, problem: str) -> None:
@@ -152,6 +156,12 @@ def fill_clear_texels(texture: np.ndarray) -> np.ndarray:
     return filled
 
 
+def mirrored(texture: np.ndarray, across: bool, down: bool) -> np.ndarray:
+    """A picture with its mirror image right of it, below it, or both: repeated it is the picture mirrored."""
+    texture = np.concatenate([texture, texture[:, ::-1]], axis=1) if across else texture
+    return np.concatenate([texture, texture[::-1]]) if down else texture
+
+
 def read_mtl(files: ModelFiles, reference: str, allow_missing: bool) -> dict[str, Material]:
     """Materials of an MTL file by name: Kd, d or Tr, map_Kd, map_d.
 
@@ -177,7 +187,8 @@ def _mtl_material(files: ModelFiles, name: str, lines: dict[str, str], allow_mis
     red, green, blue = (float(c) for c in linear_from_srgb(np.array(color)))
     base_color = (red, green, blue, _mtl_opacity(files, place, lines))
     texture = _mtl_texture(files, place, lines, allow_missing)
-    return finished(files, with_alpha_mode(Material(name, base_color, texture)))
+    clamp = "map_kd" in lines and _mtl_clamps(lines["map_kd"])
+    return finished(files, with_alpha_mode(Material(name, base_color, texture, clamp=(clamp, clamp))))
 
 
 def _mtl_opacity(files: ModelFiles, place: str, lines: dict[str, str]) -> float:
@@ -232,6 +243,12 @@ def _mtl_reference(value: str) -> str:
         value = rest.strip()
         option, _, rest = value.partition(" ")
     return value
+
+
+def _mtl_clamps(value: str) -> bool:
+    """Whether a map statement's options ask for clamping."""
+    options = value[: len(value) - len(_mtl_reference(value))].lower().split()
+    return ("-clamp", "on") in itertools.pairwise(options)
 
 
 def _is_number(word: str) -> bool:

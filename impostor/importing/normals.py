@@ -7,12 +7,14 @@ import numpy as np
 _LARGEST_FAN = 512
 
 
-def weld(positions: np.ndarray) -> np.ndarray:
+def weld(positions: np.ndarray, least_step: float = 0.0) -> np.ndarray:
     """Number the distinct positions.
 
     Parameters
     ----------
     positions : ndarray, (N, 3) float32
+    least_step : float
+        Of the grid, where the positions were rounded before they were moved to the origin.
 
     Returns
     -------
@@ -24,7 +26,7 @@ def weld(positions: np.ndarray) -> np.ndarray:
     Positions are the same when they round to the same point of a grid of 2**-22 of the largest coordinate, about
     the step of a float there: exporters write the last point of a circle by another sum than its first.
     """
-    step = float(np.abs(positions).max(initial=0.0)) * 2.0**-22 or 1.0
+    step = max(float(np.abs(positions).max(initial=0.0)) * 2.0**-22, least_step) or 1.0
     bits = np.rint(positions / step).astype(np.int64).view(np.uint64)
     multipliers = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
     key = (bits * multipliers).sum(axis=1, dtype=np.uint64)
@@ -47,7 +49,7 @@ def face_vectors(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def computed_normals(
-    positions: np.ndarray, triangles: np.ndarray, crease: float, welded: bool = True
+    positions: np.ndarray, triangles: np.ndarray, crease: float, welded: bool = True, least_step: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Angle-weighted vertex normals, with vertices doubled along edges sharper than the crease angle.
 
@@ -60,6 +62,8 @@ def computed_normals(
         Radians. Two faces of a vertex share its normal when theirs differ by less; 0 shades flat, pi all smooth.
     welded : bool
         Whether vertices at the same position count as one.
+    least_step : float
+        As `weld`.
 
     Returns
     -------
@@ -73,7 +77,7 @@ def computed_normals(
     if crease <= 0.0:
         corners = np.arange(triangles.size).reshape(-1, 3)
         return np.repeat(faces, 3, axis=0), corners, triangles.reshape(-1)
-    point = weld(positions) if welded else np.arange(len(positions))
+    point = weld(positions, least_step) if welded else np.arange(len(positions))
     points = point[triangles]
     weights = _corner_angles(positions, triangles)
     smooth = _unit(_sum_at(points, weights, faces, int(point.max()) + 1))

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from impostor.errors import ModelError
+from impostor.importing.distance import Distance
 from impostor.importing.materials import Material
 from impostor.importing.normals import agreeing_winding, computed_normals, face_vectors, repaired_normals, weld
 
@@ -47,7 +48,7 @@ class Part:
 
 
 def checked(where, part: Part) -> Part:
-    """The part with its arrays' shapes, indices and numbers checked.
+    """The part with its arrays' shapes, indices and numbers checked, and no vertices that no triangle uses.
 
     Raises
     ------
@@ -69,6 +70,7 @@ def checked(where, part: Part) -> Part:
         raise ModelError(where, f"{part.place}: colors are {part.colors.dtype}, expected uint8")
     _check_indices(where, part, count)
     _check_finite(where, part)
+    _drop_unused(part)
     return part
 
 
@@ -93,8 +95,10 @@ def _check_finite(where, part: Part) -> None:
             raise ModelError(where, f"{part.place}: {name} of vertex {bad[0]} are {value}, expected finite numbers")
 
 
-def finished_part(where, part: Part, crease: float, welded: bool = True) -> Part | None:
+def finished_part(where, part: Part, distance: Distance, crease: float, welded: bool = True) -> Part | None:
     """A checked part in world space: instances expanded, degenerate triangles dropped, normals unit and agreeing.
+
+    Its positions have 32 bits where it is not far from the origin, and 64 bits else.
 
     Returns
     -------
@@ -106,9 +110,11 @@ def finished_part(where, part: Part, crease: float, welded: bool = True) -> Part
     ModelError
         When a coordinate is too large for sums of squares in 32-bit floats.
     """
-    part = _expanded(where, part)
+    part, far = _expanded(where, part, distance.origin), distance.origin.any()
+    # The file's own rounding parts what its author had joined.
+    step = 2 * distance.step if far else 0.0
     if welded and _is_soup(part):
-        _merge_vertices(part)
+        _merge_vertices(part, step)
     keep = (face_vectors(part.positions, part.triangles) != 0).any(axis=1)
     if not keep.all():
         part.triangles = part.triangles[keep]
@@ -116,7 +122,7 @@ def finished_part(where, part: Part, crease: float, welded: bool = True) -> Part
     if not len(part.triangles):
         return None
     if part.normals is None:
-        normals, part.triangles, source = computed_normals(part.positions, part.triangles, crease, welded)
+        normals, part.triangles, source = computed_normals(part.positions, part.triangles, crease, welded, step)
         _take(part, source)
         part.normals = normals
     else:
@@ -127,6 +133,8 @@ def finished_part(where, part: Part, crease: float, welded: bool = True) -> Part
         part.colors = np.repeat(part.face_colors, 3, axis=0)
         part.triangles = np.arange(part.triangles.size).reshape(-1, 3)
     _drop_unused(part)
+    if far:
+        part.positions = part.positions + distance.origin
     return part
 
 
@@ -160,8 +168,8 @@ def normal_matrix(linear: np.ndarray) -> np.ndarray:
     return np.where(mirrored[..., None, None], -cofactors, cofactors)
 
 
-def _expanded(where, part: Part) -> Part:
-    _drop_unused(part)
+def _expanded(where, part: Part, origin: np.ndarray) -> Part:
+    """Every instance of a part, less the origin."""
     count, instances = len(part.positions), len(part.worlds)
     worlds = np.asarray(part.worlds, np.float64)
     positions = part.positions.astype(np.float64) if instances > 1 or not _is_identity(worlds) else part.positions
@@ -177,7 +185,7 @@ def _expanded(where, part: Part) -> Part:
     triangles = [_wound(part.triangles, world) + index * count for index, world in enumerate(worlds)]
     return Part(
         part.place,
-        positions.astype(np.float32),
+        (positions - origin if origin.any() else positions).astype(np.float32),
         np.concatenate(triangles),
         normals,
         _tiled(part.uvs, instances),
@@ -205,8 +213,8 @@ def _is_soup(part: Part) -> bool:
     return plain and 0 < len(part.positions) == part.triangles.size
 
 
-def _merge_vertices(part: Part) -> None:
-    number = weld(part.positions)
+def _merge_vertices(part: Part, step: float) -> None:
+    number = weld(part.positions, step)
     first = np.empty(int(number.max()) + 1, np.int64)
     first[number] = np.arange(len(number))
     part.positions = part.positions[first]

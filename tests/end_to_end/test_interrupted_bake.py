@@ -15,7 +15,7 @@ from tests.end_to_end.commands import SMALL, run
 KNOT = SAMPLES / "knot.stl"
 # The command, which says when it has baked the third view and when it has written a file that has no name yet.
 STOPPED = """
-import sys, time
+import ctypes, sys, time
 import bake.fan
 import impostor.files.fan_file as fan_file
 from impostor.cli import main
@@ -27,8 +27,28 @@ def stop_at(name):
         print("ready", flush=True)
         time.sleep(60)
 
+# An argument whose conversion takes long: what is raised in it becomes an error of ctypes, as in PyOpenGL.
+class Converted:
+    @classmethod
+    def from_param(cls, value):
+        stop_at("converting")
+
+call = ctypes.CDLL(None).abs
+call.argtypes = [Converted]
+
 def bake_fan(*arguments, bake_fan=bake.fan.bake_fan, **options):
-    return bake_fan(*arguments, **{**options, "progress": lambda done, total: done == 3 and stop_at("baking")})
+    def progress(done, total, progress=options["progress"]):
+        if done == 3:
+            stop_at("baking")
+        progress(done, total)
+
+    if place == "converting":
+        call(None)
+    try:
+        stop_at("swallowing")
+    except:  # as libraries do that look for other libraries
+        pass
+    return bake_fan(*arguments, **{**options, "progress": progress})
 
 def write_archive(*arguments, write_archive=fan_file.write_archive):
     write_archive(*arguments)
@@ -64,12 +84,13 @@ def test_a_killed_bake_leaves_no_fan_and_the_next_cleans_up(tmp_path, place):
     assert validate_fan(tmp_path / "a.fan") == []
 
 
-@pytest.mark.parametrize("place", ["baking", "writing"])
-def test_ctrl_c_is_one_line_and_leaves_nothing(tmp_path, place):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("place", ["baking", "writing", "converting", "swallowing"])
+def test_ctrl_c_or_kill_is_one_line_and_leaves_nothing(tmp_path, place, number):
     with stopped_bake(tmp_path, place) as process:
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         out, err = process.communicate(timeout=30)
-    assert (process.returncode, out, err) == (130, "", "impostor: stopped\n")
+    assert (process.returncode, out, err) == (128 + number, "", "impostor: stopped\n")
     assert os.listdir(tmp_path) == []
 
 

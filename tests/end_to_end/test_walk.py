@@ -406,7 +406,8 @@ class TestWithoutWindow:
         assert run("render", scene, "-o", tmp_path / "a.png", flag, value) == 2
         assert capsys.readouterr().err.startswith(f"impostor: {flag}: given with {scene}")
 
-    def test_a_stopped_film_leaves_nothing(self, scene, tmp_path):
+    @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+    def test_a_stopped_film_leaves_nothing(self, scene, tmp_path, number):
         film = tmp_path / "film.mp4"
         command = [COMMAND, "walk", scene, "--record", film, "--frames", "100000", "--size", "64x48"]
         process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
@@ -414,9 +415,9 @@ class TestWithoutWindow:
         while not any(each.stat().st_size for each in tmp_path.iterdir()) and time.monotonic() < deadline:
             assert process.poll() is None
             time.sleep(0.1)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         _, err = process.communicate(timeout=30)
-        assert (process.returncode, err) == (130, "impostor: stopped\n")
+        assert (process.returncode, err) == (128 + number, "impostor: stopped\n")
         assert list(tmp_path.iterdir()) == []
 
     def test_a_stopped_bake_leaves_nothing_and_says_so_once(self, tmp_path):

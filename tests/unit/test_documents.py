@@ -62,3 +62,10 @@ def test_the_numbers_of_the_readme_are_the_benchmarks():
     for page, make in readme_table.PAGES:
         text = page.read_text()
         assert readme_table.with_table(text, make(results)) == text
+
+
+def test_what_the_method_says_of_the_dragon_is_measured():
+    rows = json.loads(readme_table.RESULTS.read_text())[readme_table.MACHINE]["tables"]["quality"]["rows"]
+    at = [round(rows[f"dragon/{degrees}"]["values"]["psnr_db"]) for degrees in (0, 5, 20)]
+    said = f"the dragon falls from {at[0]} dB to {at[1]} at 5 degrees and to {at[2]} at 20"
+    assert said in " ".join((ROOT / "docs/method.md").read_text().split())

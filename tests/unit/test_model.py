@@ -277,13 +277,7 @@ def test_gltf_normalised_coordinates_second_set_and_texture_transform(tmp_path):
     np.testing.assert_allclose(primitive.uvs, [[0.5, 0.25], [0.5, -1.75], [1.5, 0.25]], atol=1e-6)
 
 
-def test_gltf_clamping_and_missing_coordinates_are_told(tmp_path):
-    builder = GltfBuilder()
-    builder.mesh(material=builder.texture(QUARTERS), TEXCOORD_0=np.array([[0, 0], [3, 0], [0, 1]], "f4"))
-    builder.document["samplers"] = [{"wrapS": 33071}]
-    builder.document["textures"][0]["sampler"] = 0
-    with pytest.warns(ModelWarning, match="clamping"):
-        load_model(builder.write(tmp_path / "clamp.glb"))
+def test_gltf_missing_coordinates_are_told(tmp_path):
     builder = GltfBuilder()
     builder.mesh(material=builder.texture(QUARTERS))
     with pytest.warns(ModelWarning, match="TEXCOORD_0"):
