@@ -56,7 +56,9 @@ def luminance_and_color(planes: Floats, axes: Floats, scratch: Floats, out: Floa
         The pseudo-inverse of `light_root`.
     """
     squares = scratch[3:]
-    np.einsum("tin,tjn->ijn", planes, planes, out=squares)
+    for axis in range(3):  # the matrix is symmetric
+        np.einsum("tn,tjn->jn", planes[:, axis], planes[:, axis:], out=squares[axis, axis:])
+        squares[axis + 1 :, axis] = squares[axis, axis + 1 :]
     square, scale, most = scratch[2]
     along, other = _leading_vector(squares, axes.sum(axis=0), scratch[0], scratch[1], square)
     color = np.einsum("ck,kn->cn", axes, along, out=out[TERMS:])
