@@ -6,10 +6,13 @@ photographs: the lights' Gram matrix says how far apart two sets of coefficients
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from numpy.typing import NDArray
 
 from bake.design import Design
+from bake.one_pass import Coefficients, Floats
 from bake.small_products import multiply
 from impostor.ptm.polynomials import RGB_FROM_YCRCB, TERMS
 
@@ -19,82 +22,85 @@ TINY = np.float32(1e-20)
 POWER = 4  # of the squares: a second colour half as strong as the first is left at 0.4 percent
 
 
-def luminance_and_color(
-    planes: NDArray[np.float32], scratch: NDArray[np.float32], root: NDArray[np.float32]
-) -> NDArray[np.float32]:
+def three_polynomials(planes: Floats, axes: Floats, scratch: Floats, out: Floats) -> None:
+    """The polynomials of red, green and blue.
+
+    Parameters
+    ----------
+    planes, axes, scratch : ndarray
+        As in `luminance_and_color`.
+    out : ndarray of shape (18, N), float32
+        Takes six coefficients of red, of green and of blue.
+    """
+    np.einsum("ck,tkn->tcn", axes, planes, out=out.reshape(TERMS, 3, -1))
+
+
+def luminance_and_color(planes: Floats, axes: Floats, scratch: Floats, out: Floats, back: Floats) -> None:
     """The luminance polynomial and the constant colour that together come nearest to three polynomials.
 
     Over the photographed lights, the sum of squared differences is least: the leading singular vector of the
-    coefficients, weighted by the lights. The colour is scaled so that the luminance of every texel has about the
+    coefficients, turned by `light_root`. The colour is scaled so that the luminance of every texel has about the
     same size, which lets the 8 bits that all texels share serve dark ones as well as bright ones.
 
     Parameters
     ----------
     planes : ndarray of shape (6, 3, N), float32
-        The RGB fit of N texels, contiguous.
-    scratch : ndarray of shape (9, 3, N), float32
+        The fit of N texels along three axes, turned by `light_root`; contiguous.
+    axes : ndarray of shape (3, 3), float32
+        The axes, in columns, as red, green and blue; orthonormal.
+    scratch : ndarray of shape (6, 3, N), float32
         Contiguous; written over. New memory for every block of texels would take as long as all the arithmetic.
-    root : ndarray of shape (T, 6), float32
-        As `light_root` gives it.
-
-    Returns
-    -------
-    ndarray of shape (6, 3, N), float32
-        `planes`, written over: luminance in [:, 0], color in [:3, 1], 0..1.
+    out : ndarray of shape (9, N), float32
+        Takes the luminance, 6 rows, and the color, 3 rows, 0..1.
+    back : ndarray of shape (6, 6), float32
+        The pseudo-inverse of `light_root`.
     """
-    terms, texels = len(root), planes.shape[2]
-    weighted, squares = scratch[:terms], scratch[TERMS:]
-    multiply(root, planes.reshape(TERMS, -1), weighted.reshape(terms, -1))
-    np.einsum("tin,tjn->ijn", weighted, weighted, out=squares)
-    length, scale, _ = scratch[2]
-    color, other = _leading_vector(squares, scratch[0], scratch[1], length)
+    squares = scratch[3:]
+    for axis in range(3):  # the matrix is symmetric
+        np.einsum("tn,tjn->jn", planes[:, axis], planes[:, axis:], out=squares[axis, axis:])
+        squares[axis + 1 :, axis] = squares[axis, axis + 1 :]
+    square, scale, most = scratch[2]
+    along, other = _leading_vector(squares, axes.sum(axis=0), scratch[0], scratch[1], square)
+    color = np.einsum("ck,kn->cn", axes, along, out=out[TERMS:])
     np.maximum(color, 0, out=color)  # what is below 0 there is noise
-    _divide(color, np.sqrt(np.einsum("cn,cn->n", color, color, out=length), out=length))
-    np.einsum("cn,cn->n", color, np.einsum("ijn,jn->in", squares, color, out=other), out=scale)
+    np.maximum(np.einsum("cn,cn->n", color, color, out=square), TINY, out=square)
+    # For a color of length 1, the luminance's mean square over the lights is its product with the matrix.
+    np.einsum("kc,cn->kn", axes.T, color, out=along)
+    np.einsum("kn,kn->n", along, np.einsum("ijn,jn->in", squares, along, out=other), out=scale)
     np.sqrt(np.maximum(scale, 0, out=scale), out=scale)
-    scale /= np.float32(TYPICAL_LUMINANCE)
-    np.maximum(np.amax(color, axis=0, out=length), TINY, out=length)
-    np.minimum(scale, np.divide(1, length, out=length), out=scale)
+    scale /= np.multiply(square, np.float32(TYPICAL_LUMINANCE), out=most)
+    np.minimum(scale, np.divide(1, np.maximum(np.amax(color, axis=0, out=most), TINY, out=most), out=most), out=scale)
     np.maximum(scale, DARKEST, out=scale)
-    luminance = scratch[3:5].reshape(TERMS, texels)
-    np.einsum("tcn,cn->tn", planes, np.divide(color, scale, out=other), out=luminance)
-    planes[:, 0] = luminance
-    np.multiply(color, scale, out=planes[:3, 1])
-    return planes
+    color *= scale
+    along /= np.multiply(square, scale, out=square)
+    multiply(back, np.einsum("tkn,kn->tn", planes, along, out=squares[:2].reshape(TERMS, -1)), out[:TERMS])
 
 
 def luma_and_chroma(
-    planes: NDArray[np.float32], scratch: NDArray[np.float32], design: Design, luma_from_rgb: NDArray[np.float64]
-) -> NDArray[np.float32]:
+    planes: Floats, axes: Floats, scratch: Floats, out: Floats, design: Design, luma_from_rgb: NDArray[np.float64]
+) -> None:
     """The luma polynomial and the mean chromaticity of three polynomials.
 
     Parameters
     ----------
-    planes : ndarray of shape (6, 3, N), float32
-    scratch : ndarray of shape (9, 3, N), float32
+    planes, axes, scratch : ndarray
         As in `luminance_and_color`.
+    out : ndarray of shape (8, N), float32
+        Takes the luma, 6 rows, and the chroma, 2 rows.
     design : Design
     luma_from_rgb : ndarray of shape (3, 4), float64
         As `ycrcb` or `principal_axes` gives it.
-
-    Returns
-    -------
-    ndarray of shape (6, 3, N), float32
-        `planes`, written over: luma in [:, 0], chroma in [:2, 1].
 
     References
     ----------
     HPL-98-131, section 3.
     """
-    matrix = luma_from_rgb.astype(np.float32)
-    luma, mean = scratch[:2].reshape(TERMS, -1), scratch[2]
-    np.einsum("c,tcn->tn", matrix[0, :3], planes, out=luma)
-    luma[5] += matrix[0, 3]
-    np.einsum("t,tcn->cn", design.matrix.mean(axis=0).astype(np.float32), planes, out=mean)
-    planes[:, 0] = luma
-    np.einsum("ic,cn->in", matrix[1:, :3], mean, out=planes[:2, 1])
-    planes[:2, 1] += matrix[1:, 3:]
-    return planes
+    matrix = np.column_stack([luma_from_rgb[:, :3] @ axes, luma_from_rgb[:, 3]]).astype(np.float32)
+    np.einsum("c,tcn->tn", matrix[0, :3], planes, out=out[:TERMS])
+    out[5] += matrix[0, 3]
+    mean = np.einsum("t,tcn->cn", design.matrix.mean(axis=0).astype(np.float32), planes, out=scratch[0])
+    np.einsum("ic,cn->in", matrix[1:, :3], mean, out=out[TERMS:])
+    out[TERMS:] += matrix[1:, 3:]
 
 
 def ycrcb() -> NDArray[np.float64]:
@@ -128,41 +134,37 @@ def principal_axes(spread: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.column_stack([np.vstack([first, chroma]), np.array([0.0, *offset])])
 
 
-def light_spread(planes: NDArray[np.float32], design: Design) -> NDArray[np.float64]:
-    """Covariance of RGB over the photographed lights, summed over N texels.
-
-    Parameters
-    ----------
-    planes : ndarray of shape (6, 3, N), float32
-    design : Design
-
-    Returns
-    -------
-    ndarray of shape (3, 3), float64
-    """
+def light_spread(coefficients: Coefficients, design: Design, pool: ThreadPoolExecutor) -> NDArray[np.float64]:
+    """Covariance of RGB over the photographed lights, summed over all texels: (3, 3), float64."""
     centred = design.matrix - design.matrix.mean(axis=0)
     values, vectors = np.linalg.eigh(centred.T @ centred)
     root = (vectors * np.sqrt(values.clip(0))).T.astype(np.float32)
-    weighted = multiply(root, planes.reshape(TERMS, -1)).reshape(planes.shape)
-    return np.einsum("tin,tjn->ij", weighted, weighted).astype(np.float64)
+
+    def spread(bounds: tuple[int, int]) -> NDArray[np.float64]:
+        planes = np.empty((TERMS, 3, bounds[1] - bounds[0]), np.float32)
+        coefficients.block(*bounds, planes)
+        weighted = multiply(root, planes.reshape(TERMS, -1)).reshape(planes.shape)
+        return np.einsum("tin,tjn->ij", weighted, weighted).astype(np.float64)
+
+    along = np.sum(list(pool.map(spread, coefficients.blocks)), axis=0)
+    return coefficients.axes @ along @ coefficients.axes.T
 
 
-def light_root(design: Design) -> NDArray[np.float32]:
+def light_root(design: Design) -> NDArray[np.float64]:
     """What turns coefficients into vectors whose squared length is a polynomial's mean square over the lights.
 
     Parameters
     ----------
     design : Design
-        With T terms in use.
 
     Returns
     -------
-    ndarray of shape (T, 6), float32
+    ndarray of shape (6, 6), float64
     """
     terms = list(design.terms)
     active = design.matrix[:, terms]
-    root = np.zeros((len(terms), TERMS), np.float32)
-    root[:, terms] = np.linalg.cholesky(active.T @ active / len(active)).T
+    root = np.zeros((TERMS, TERMS))
+    root[np.ix_(terms, terms)] = np.linalg.cholesky(active.T @ active / len(active)).T
     return root
 
 
@@ -173,17 +175,15 @@ def inverse(affine: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _leading_vector(
-    squares: NDArray[np.float32],
-    vector: NDArray[np.float32],
-    other: NDArray[np.float32],
-    length: NDArray[np.float32],
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """The direction in RGB, of any length, along which N sets of coefficients with products (3, 3, N) are largest.
+    squares: Floats, start: Floats, vector: Floats, other: Floats, length: Floats
+) -> tuple[Floats, Floats]:
+    """The direction, of any length, along which N sets of coefficients with products (3, 3, N) are largest.
 
-    By the power method, from gray: a colour has no negative part, so gray is never at right angles to it. It is found
-    in one of two arrays (3, N); the other one is given back behind it. `length` (N,) is scratch memory.
+    By the power method, from gray, which `start` (3,) is: a colour has no negative part, so gray is never at right
+    angles to it. It is found in one of two arrays (3, N); the other one is given back behind it. `length` (N,) is
+    scratch memory.
     """
-    np.sum(squares, axis=1, out=vector)
+    np.einsum("ijn,j->in", squares, start, out=vector)
     for power in range(2, POWER + 1):
         np.einsum("ijn,jn->in", squares, vector, out=other)
         vector, other = other, vector
@@ -192,6 +192,6 @@ def _leading_vector(
     return vector, other
 
 
-def _divide(vectors: NDArray[np.float32], lengths: NDArray[np.float32]) -> None:
+def _divide(vectors: Floats, lengths: Floats) -> None:
     """Divide vectors (3, N) by lengths (N,), in place; a vector of no length keeps it."""
     np.divide(vectors, np.maximum(lengths, TINY, out=lengths), out=vectors)

@@ -3,54 +3,92 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bake.design import Design
-from bake.photographs import Photographs, decoded
+from bake.photographs import Photographs, Source, decoded
 from bake.small_products import multiply
 from impostor.errors import SettingsError
 from impostor.ptm.polynomials import TERMS, Curve
 from impostor.srgb import linear_from_srgb
 
-# From coefficients (6, C, n) of a few texels, and scratch memory (9, C, n), to what is wanted of them: (6, C, n).
-Turn = Callable[[NDArray[np.float32], NDArray[np.float32]], NDArray[np.float32]]
-SCRATCH = 9
+Bounds = tuple[int, int]
+Floats = NDArray[np.float32]
+# From coefficients (6, 3, n) of a few texels, with their axes (3, 3) and scratch memory (6, 3, n), to rows (R, n).
+Turn = Callable[[Floats, Floats, Floats, Floats], None]
 
-BATCH = 17  # photographs between two visits to the accumulators, which weigh as much as 24 of them
-BLOCK = 6400  # texels of a batch at a time: fewer lose time between calls, more fall out of the cache
+BATCH = 25  # photographs between two visits to the accumulators, which weigh as much as 24 of them
+BLOCK = 6400  # texels at a time: fewer lose time between calls, more fall out of the cache
 SLICES_A_WORKER = 4  # so that workers end together
 
 
-def accumulate(
-    photographs: Photographs,
-    design: Design,
-    curve: Curve,
-    pool: ThreadPoolExecutor,
-    progress: Callable[[int, int], None] | None = None,
-    turn: Turn | None = None,
-) -> NDArray[np.float32]:
-    """Coefficients of every channel of every texel by linear least squares.
+class Coefficients(Protocol):
+    """Fitted coefficients of three channels a texel, along axes that are orthonormal in red, green and blue."""
+
+    axes: Floats  # (3, 3), in columns
+
+    @property
+    def blocks(self) -> list[Bounds]: ...
+    def block(self, start: int, stop: int, out: Floats) -> None: ...
+
+
+class PlanarCoefficients:
+    """Coefficients (6, C, N), float32, one channel or three: red, green and blue themselves.
 
     Parameters
     ----------
-    photographs : Photographs
-    design : Design
-    curve : {"srgb", "linear"}
+    planes : ndarray of shape (6, C, N), float32
+    turn : ndarray of shape (6, 6), float32, optional
+        What turns them into what is wanted.
+    """
+
+    axes = np.eye(3, dtype=np.float32)
+
+    def __init__(self, planes: Floats, turn: Floats | None = None):
+        self.planes, self._turn = planes, turn
+
+    @property
+    def blocks(self) -> list[Bounds]:
+        """Blocks of texels."""
+        return blocks(self.planes.shape[2], BLOCK)
+
+    def block(self, start: int, stop: int, out: Floats) -> None:
+        """Put coefficients of a block of texels in an array (6, 3, n)."""
+        if self._turn is None:
+            np.copyto(out, self.planes[:, :, start:stop])
+        else:
+            np.einsum("st,tcn->scn", self._turn, self.planes[:, :, start:stop], out=out)
+
+
+def accumulate(
+    photographs: Source,
+    solver: Floats,
+    pool: ThreadPoolExecutor,
+    table: Floats | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Floats:
+    """Coefficients of every value of a photograph by linear least squares.
+
+    Parameters
+    ----------
+    photographs : Photographs or HalfChroma
+        N of them.
+    solver : ndarray of shape (6, N), float32
+        Coefficients are its product with a value in all photographs.
     pool : ThreadPoolExecutor
+    table : ndarray of float32, optional
+        What stored values stand for; themselves if not given.
     progress : callable, optional
         Called with photographs decoded and photographs in all.
-    turn : callable, optional
-        Takes the coefficients (6, C, n), float32, of a block of texels while they are still in the cache, and scratch
-        memory (9, C, n), float32; gives what is to be returned in their place. Called in worker threads.
 
     Returns
     -------
-    ndarray of shape (6, C, H * W), float32
+    ndarray of shape (6, values), float32
+        In the order in which values lie in memory: of `Photographs`, channel after channel.
 
     Raises
     ------
@@ -61,43 +99,62 @@ def accumulate(
     The pseudo-inverse of the lights' matrix is known before the first pixel is, so each photograph adds its share to
     the coefficients and is forgotten. Batches and blocks do not depend on the threads, nor then does any rounding.
     """
-    table = value_table(photographs, curve)
-    scale = 1 if table is not None else 1 / photographs.white
-    solver = (design.solver * scale).astype(np.float32)
-    texels = photographs.size[0] * photographs.size[1]
-    planes = np.empty((TERMS, photographs.channels, texels), np.float32)
-    done = 0
+    planes: Floats | None = None
     for indices, pixels in decoded(photographs, pool, BATCH, progress):
-        values = np.moveaxis(pixels, -1, 1).reshape(len(pixels), photographs.channels, texels)
-        weights = np.ascontiguousarray(solver[:, indices])
-        last = done + len(indices) == len(photographs)
-        share = _Share(planes, values, weights, table, done > 0, turn if last else None)
-        _in_slices(share.add, texels, pool)
-        done += len(indices)
+        values = np.moveaxis(pixels, -1, 1).reshape(len(pixels), -1)  # a view
+        begun = planes is not None
+        if planes is None:
+            planes = np.empty((TERMS, values.shape[1]), np.float32)
+        _add_share(planes, values, np.ascontiguousarray(solver[:, indices]), table, begun, pool)
+    assert planes is not None
     return planes
 
 
-def turn_all(planes: NDArray[np.float32], turn: Turn, pool: ThreadPoolExecutor) -> None:
-    """Put in the place of coefficients (6, C, N), block by block, what is wanted of them."""
+def _add_share(
+    planes: Floats,
+    batch: NDArray[Any],
+    weights: Floats,
+    table: Floats | None,
+    begun: bool,
+    pool: ThreadPoolExecutor,
+) -> None:
+    """Add what one batch (K, values) gives to coefficients (6, values), which begin with the first one's."""
 
-    def work(start: int, stop: int) -> None:
-        channels = planes.shape[1]
-        memory = np.empty((TERMS + SCRATCH) * channels * min(BLOCK, stop - start), np.float32)
-        for low, high in blocks(start, stop):
-            both = memory[: (TERMS + SCRATCH) * channels * (high - low)].reshape(-1, channels, high - low)
-            block, scratch = both[:TERMS], both[TERMS:]
-            np.copyto(block, planes[:, :, low:high])
-            planes[:, :, low:high] = turn(block, scratch)
+    def work(bounds: Sequence[Bounds]) -> None:
+        most = max(high - low for low, high in bounds)
+        memory = np.empty((len(batch) + TERMS) * most, np.float32)
+        for low, high in bounds:
+            both = memory[: (len(batch) + TERMS) * (high - low)].reshape(-1, high - low)
+            values, share, sums = both[: len(batch)], both[len(batch) :], planes[:, low:high]
+            if table is None:
+                np.copyto(values, batch[:, low:high])
+            else:
+                np.take(table, batch[:, low:high], out=values, mode="clip")
+            multiply(weights, values, share)
+            if begun:
+                np.add(sums, share, out=sums)
+            else:
+                np.copyto(sums, share)
 
-    _in_slices(work, planes.shape[2], pool)
+    in_slices(work, blocks(planes.shape[1], 3 * BLOCK), pool)
 
 
-def blocks(start: int, stop: int) -> list[tuple[int, int]]:
-    """The blocks of texels from one up to another."""
-    return [(low, min(low + BLOCK, stop)) for low in range(start, stop, BLOCK)]
+def turned(coefficients: Coefficients, turn: Turn, out: Floats, pool: ThreadPoolExecutor) -> Floats:
+    """What is wanted of coefficients, block by block: rows (R, N), in `out`."""
+
+    def work(bounds: Sequence[Bounds]) -> None:
+        most = max(high - low for low, high in bounds)
+        memory = np.empty(2 * TERMS * 3 * most, np.float32)
+        for low, high in bounds:
+            both = memory[: 2 * TERMS * 3 * (high - low)].reshape(-1, 3, high - low)
+            coefficients.block(low, high, both[:TERMS])
+            turn(both[:TERMS], coefficients.axes, both[TERMS:], out[:, low:high])
+
+    in_slices(work, coefficients.blocks, pool)
+    return out
 
 
-def value_table(photographs: Photographs, curve: Curve) -> NDArray[np.float32] | None:
+def value_table(photographs: Photographs, curve: Curve) -> Floats | None:
     """Light of every stored value, where it is not the value over white itself."""
     if curve == "srgb":
         return None
@@ -113,50 +170,14 @@ def worker_count(workers: int | None) -> int:
     return workers
 
 
-def _in_slices(work: Callable[[int, int], None], texels: int, pool: ThreadPoolExecutor) -> None:
-    """Do work on all texels, in slices of whole blocks, in all threads of a pool."""
-    count = SLICES_A_WORKER * pool._max_workers
-    step = -(-texels // (count * BLOCK)) * BLOCK
-    tasks = [pool.submit(work, start, min(start + step, texels)) for start in range(0, texels, step)]
+def blocks(count: int, size: int) -> list[Bounds]:
+    """Blocks of texels or values, of one size but for the last."""
+    return [(low, min(low + size, count)) for low in range(0, count, size)]
+
+
+def in_slices(work: Callable[[Sequence[Bounds]], None], bounds: Sequence[Bounds], pool: ThreadPoolExecutor) -> None:
+    """Do work on all blocks, in slices of neighbouring ones, in all threads of a pool."""
+    step = -(-len(bounds) // (SLICES_A_WORKER * pool._max_workers))
+    tasks = [pool.submit(work, bounds[first : first + step]) for first in range(0, len(bounds), step)]
     for task in tasks:
         task.result()
-
-
-class _Share:
-    """What one batch (K, C, N) adds to the coefficients (6, C, N); the first one's share is what they begin with."""
-
-    def __init__(
-        self,
-        planes: NDArray[np.float32],
-        batch: NDArray[Any],
-        weights: NDArray[np.float32],
-        table: NDArray[np.float32] | None,
-        begun: bool,
-        turn: Turn | None,
-    ):
-        self.planes, self.batch, self.weights, self.table = planes, batch, weights, table
-        self.begun, self.turn = begun, turn
-
-    def add(self, start: int, stop: int) -> None:
-        """Add it for a slice of texels."""
-        count, channels, _ = self.batch.shape
-        most = min(BLOCK, stop - start) * channels
-        # The photographs' values are spent when the coefficients are turned: their memory is scratch then.
-        value_memory = np.empty(max(count, SCRATCH) * most, np.float32)
-        share_memory = np.empty(TERMS * most, np.float32)
-        for low, high in blocks(start, stop):
-            length = channels * (high - low)
-            values = value_memory[: count * length].reshape(count, channels, high - low)
-            share = share_memory[: TERMS * length].reshape(TERMS, channels, high - low)
-            if self.table is None:
-                np.copyto(values, self.batch[:, :, low:high])
-            else:
-                np.take(self.table, self.batch[:, :, low:high], out=values, mode="clip")
-            multiply(self.weights, values.reshape(count, length), share.reshape(TERMS, length))
-            planes = self.planes[:, :, low:high]
-            if self.begun:
-                np.add(planes, share, out=planes if self.turn is None else share)
-            if self.turn is not None:
-                planes[:] = self.turn(share, value_memory[: SCRATCH * length].reshape(SCRATCH, channels, high - low))
-            elif not self.begun:
-                planes[:] = share

@@ -16,10 +16,12 @@ from bake.color_models import (
     luma_and_chroma,
     luminance_and_color,
     principal_axes,
+    three_polynomials,
     ycrcb,
 )
-from bake.design import ALL_TERMS, Design, make_design
-from bake.one_pass import Turn, accumulate, blocks, turn_all, value_table, worker_count
+from bake.design import ALL_TERMS, make_design
+from bake.half_chroma import HalfChroma, HalfChromaCoefficients
+from bake.one_pass import Coefficients, PlanarCoefficients, accumulate, turned, value_table, worker_count
 from bake.photographs import Photographs
 from bake.robust import robust_coefficients
 from impostor.errors import SettingsError
@@ -90,30 +92,41 @@ def fit_ptm(
     if len(design.matrix) != len(photographs):
         raise SettingsError("lights", f"{len(design.matrix)} for {len(photographs)} photographs; expected one each")
     with ThreadPoolExecutor(worker_count(workers)) as pool:
-
-        def fit(turn: Turn | None = None) -> NDArray[np.float32]:
-            if not robust:
-                return accumulate(photographs, design, curve, pool, progress, turn)
+        # The luminance and colour of coefficients are found where all lights count alike.
+        root = light_root(design) if format == "lrgb" and photographs.channels == 3 else None
+        if robust:
             lights = light_direction(*design.parameters.T) if meaning == "light" else None
-            planes = robust_coefficients(photographs, design, lights, value_table(photographs, curve), pool, progress)
-            if turn is not None:
-                turn_all(planes, turn, pool)
-            return planes
-
+            table = value_table(photographs, curve)
+            planes = robust_coefficients(photographs, design, lights, table, pool, progress)
+            found = PlanarCoefficients(planes, None if root is None else root.astype(np.float32))
+        else:
+            found = _least_squares(
+                photographs, design.solver if root is None else root @ design.solver, curve, pool, progress
+            )
         make = partial(Polynomials, curve=curve, parameters=meaning)
-        size, gray = photographs.size, photographs.channels == 1
-        if format == "lrgb" and gray:
-            white = np.broadcast_to(np.float32(1), (size[1], size[0], 3))
-            return make(_pictures(fit(), size), color=white)
-        if format == "lrgb":
-            planes = fit(partial(luminance_and_color, root=light_root(design)))
-            return make(_pictures(planes[:, :1], size), color=_pictures(planes[:3, 1], size))
+        size = width, height = photographs.size
+
+        def rows(count: int) -> NDArray[np.float32]:
+            return np.empty((count, width * height), np.float32)
+
+        if format == "lrgb" and photographs.channels == 1:
+            assert isinstance(found, PlanarCoefficients)
+            white = np.broadcast_to(np.float32(1), (height, width, 3))
+            return make(_pictures(found.planes, size), color=white)
+        if root is not None:
+            back = np.linalg.pinv(root).astype(np.float32)
+            done = turned(found, partial(luminance_and_color, back=back), rows(9), pool)
+            return make(_pictures(done[:6, None], size), color=_pictures(done[6:], size))
         if format == "lum":
-            planes, axes = _luma(fit, design, space, gray, pool)
-            chroma = _pictures(planes[:2, 1], size)
-            return make(_pictures(planes[:, :1], size), chroma=chroma, rgb_from_luma=inverse(axes))
-        planes = fit()
-        return make(_pictures(np.broadcast_to(planes, (TERMS, 3, planes.shape[2])), size))
+            axes = ycrcb() if space == "ycbcr" else principal_axes(light_spread(found, design, pool))
+            done = turned(found, partial(luma_and_chroma, design=design, luma_from_rgb=axes), rows(8), pool)
+            chroma = _pictures(done[6:], size)
+            return make(_pictures(done[:6, None], size), chroma=chroma, rgb_from_luma=inverse(axes))
+        if isinstance(found, PlanarCoefficients):
+            planes = np.broadcast_to(found.planes, (TERMS, 3, width * height))
+        else:
+            planes = turned(found, three_polynomials, rows(18), pool).reshape(TERMS, 3, -1)
+        return make(_pictures(planes, size))
 
 
 def light_parameters(capture: CaptureSet) -> NDArray[np.float64]:
@@ -142,20 +155,22 @@ def check_choices(format: str, curve: str, space: str) -> None:
             raise SettingsError(name, f"{value!r}; expected {' or '.join(known)}")
 
 
-def _luma(
-    fit: Callable[[Turn | None], NDArray[np.float32]], design: Design, space: str, gray: bool, pool: ThreadPoolExecutor
-) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
-    """As `luma_and_chroma`, of all texels; and the colour space that was taken, (3, 4)."""
-    if space == "ycbcr" and not gray:
-        return fit(partial(luma_and_chroma, design=design, luma_from_rgb=ycrcb())), ycrcb()
-    planes = fit(None)
-    if gray:
-        planes = np.repeat(planes, 3, axis=1)
-    ends = blocks(0, planes.shape[2])
-    spreads = pool.map(lambda ends: light_spread(planes[:, :, slice(*ends)], design), ends)
-    axes = ycrcb() if space == "ycbcr" else principal_axes(np.sum(list(spreads), axis=0))
-    turn_all(planes, partial(luma_and_chroma, design=design, luma_from_rgb=axes), pool)
-    return planes, axes
+def _least_squares(
+    photographs: Photographs,
+    weights: NDArray[np.float64],
+    curve: Curve,
+    pool: ThreadPoolExecutor,
+    progress: Callable[[int, int], None] | None,
+) -> Coefficients:
+    """Products of weights (6, N) and all samples; of half the samples where photographs are stored so."""
+    table = value_table(photographs, curve)
+    scale = 1 if table is not None else 1 / photographs.white
+    solver = (weights * scale).astype(np.float32)
+    if photographs.half_chroma and table is None:
+        planes = accumulate(HalfChroma(photographs), solver, pool, None, progress)
+        return HalfChromaCoefficients(planes, photographs, solver)
+    planes = accumulate(photographs, solver, pool, table, progress)
+    return PlanarCoefficients(planes.reshape(TERMS, photographs.channels, -1))
 
 
 def _pictures(planes: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:

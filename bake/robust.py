@@ -32,6 +32,10 @@ PEAK = 6
 FLOOR = np.float32(0.006)  # what every sample weighs: shadows still darken, where nothing else speaks
 # Median deviation from a diffuse surface, relative: below the first it is one, above the second it is none (metal).
 DIFFUSE = (np.float32(0.11), np.float32(0.14))
+# Share of a texel's variance that the polynomial explains: below the first, shadows fall on it; above the second none
+# do, so what is bright on a surface that is not diffuse is its highlight. Measured on metal and on a glossy relief.
+UNSHADOWED = (np.float32(0.9), np.float32(0.93))
+HIGHLIGHT = 6  # power of value over median at which it loses weight
 
 
 def robust_coefficients(
@@ -68,8 +72,9 @@ def robust_coefficients(
     Each texel's diffuse surface (albedo times normal, three numbers in linear light) is fitted by reweighting, from
     samples that are neither dark nor bright for this texel. A sample far from it is shadow or highlight and loses its
     weight; the others weigh the more the nearer their light is to the normal. Where no diffuse surface fits, samples
-    far from the polynomial itself lose weight. All samples are spooled to a temporary file, in bands of texels, so
-    that memory does not grow with the number of photographs.
+    far from the polynomial itself lose weight, and under no shadow (metal) bright ones: around a highlight the
+    brightest light lies twice as far off as the normal, and where the nearest lamp stands decides. All samples are
+    spooled to a temporary file, in bands of texels, so that memory does not grow with the number of photographs.
     """
     channels, texels, count = photographs.channels, photographs.values // photographs.channels, len(photographs)
     sample_bytes = count * channels * photographs.dtype.itemsize
@@ -118,7 +123,7 @@ class _Weigher:
         """Coefficients (6, n, C) of samples (N, n, C) as they are stored."""
         values = self.values[samples]
         one = values[..., 0] if values.shape[2] == 1 else values @ LUMINANCE
-        weights = self._polynomial_weights(one)
+        weights = self._polynomial_weights(one, self.directions is not None)
         if self.directions is not None:
             light = self.light[samples]
             diffuse, share = self._diffuse_weights(light[..., 0] if light.shape[2] == 1 else light @ LUMINANCE)
@@ -127,16 +132,18 @@ class _Weigher:
         result[self.terms] = _weighted(self.basis, values, weights + FLOOR)
         return result
 
-    def _polynomial_weights(self, values: Floats) -> Floats:
-        """Weights (N, n) by the distance from each texel's own polynomial (Cauchy)."""
-        weights = np.ones_like(values)
+    def _polynomial_weights(self, values: Floats, of_lights: bool) -> Floats:
+        """Weights (N, n) by the distance from each texel's own polynomial (Cauchy); fewer for a metal's highlights."""
+        weights, trust = np.ones_like(values), np.float32(1)
         fitted = multiply(self.solver, values)
         for step in range(STEPS):
             if step:
                 fitted = _weighted(self.basis, values[..., None], weights)[..., 0]
             residual = values - multiply(self.basis, fitted)
+            if of_lights and not step:
+                trust = _highlight_weights(values, residual)
             weights = 1 / (1 + (residual / _spread(residual)) ** 2)
-        return weights
+        return weights * trust
 
     def _diffuse_weights(self, light: Floats) -> tuple[Floats, Floats]:
         """Weights (N, n) by the distance from a diffuse surface, and how far (n,) the texel is one, 0..1."""
@@ -169,6 +176,13 @@ def _weighted(terms: Floats, values: Floats, weights: Floats) -> Floats:
     across = np.ascontiguousarray(terms.T)
     right = np.stack([multiply(across, weights * values[..., c]) for c in range(values.shape[2])], axis=-1)
     return solve_symmetric(gram, right.astype(np.float64)).astype(np.float32)
+
+
+def _highlight_weights(values: Floats, residual: Floats) -> Floats:
+    """Weights (N, n) that bright samples lose where the polynomial leaves small residuals (N, n)."""
+    unexplained = residual.var(axis=0) / (values.var(axis=0) + NOISE**2)
+    share = ((1 - unexplained - UNSHADOWED[0]) / (UNSHADOWED[1] - UNSHADOWED[0])).clip(0, 1)
+    return 1 - share + share / (1 + (values / (np.median(values, axis=0) + NOISE)) ** HIGHLIGHT)
 
 
 def _spread(residual: Floats) -> Floats:

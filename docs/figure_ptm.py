@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from functools import cache
 from pathlib import Path
 
@@ -75,6 +76,31 @@ def ptm_normals(studio: Studio) -> Image.Image:
     return captioned([[_shown(picture) for picture in pictures]], [["as photographed", "normals", "polished"]])
 
 
+def ptm_photographs(studio: Studio) -> Image.Image | None:
+    """A carved lion's head: a photograph that was not fitted, what the others say of it, and what else they show."""
+    lp = Path(os.environ.get("IMPOSTOR_DATA", "")) / "rti" / "loewenkopf" / "dirs.lp"
+    if not lp.is_file():
+        return None
+    capture = read_lp(lp)
+    lights = capture.directions
+    held = int(np.argmax(lights @ (-0.62, 0.42, 0.66)))
+    fitted = np.flatnonzero(np.arange(len(lights)) != held)
+    photographs = open_photographs([capture.photographs[index] for index in fitted])
+    polynomials = fit_ptm(photographs, light_parameters(capture)[fitted])
+    found = normals(polynomials)
+    toward = lights[held] / np.linalg.norm(lights[held])
+    shiny = relight_specular(polynomials, found, tuple(toward), diffuse=0.5, specular=0.6, exponent=20)
+    pictures = [
+        np.asarray(Image.open(capture.photographs[held]).convert("RGB")) / 255,
+        evaluate(polynomials, *toward[:2]),
+        evaluate(polynomials, 0.6, -0.2),
+        found / 2 + 0.5,
+        shiny,
+    ]
+    captions = ["a photograph, not fitted", "fitted to the other 239", "from the right", "normals", "polished"]
+    return captioned([[_shown(picture, 4) for picture in pictures]], [captions])
+
+
 def ptm_quilt(studio: Studio) -> Image.Image:
     """A surface quilted out of a sample so that it repeats without a seam, under two lights."""
     small = _hammered()
@@ -96,9 +122,9 @@ def _fit(kind: str) -> Polynomials:
     return fit_ptm(photographs, parameters, format=kind)
 
 
-def _shown(picture: NDArray[np.floating]) -> Image.Image:
+def _shown(picture: NDArray[np.floating], times: int = 2) -> Image.Image:
     image = Image.fromarray(to_bytes(picture))
-    return image.resize((image.width * 2, image.height * 2), Image.Resampling.BICUBIC)
+    return image.resize((image.width * times, image.height * times), Image.Resampling.BICUBIC)
 
 
 def _hammered() -> Polynomials:

@@ -3,7 +3,8 @@
 Figures 3, 5a, 5b, 6b, 9 and 10 are counterparts of those in Dinh, Metoyer, Turk, "Real-Time Lighting Changes for
 Image-Based Rendering"; those named `ptm_...` of figures in HPL-98-131 and HPL-2004-225, those
 named `room_...` of GPU Gems, chapter 19; `hero` and `compare` are the
-README's. All are made from sample_models by the project itself.
+README's. All are made from sample_models by the project itself, but for `ptm_photographs`, which
+needs the real photographs and is not kept here: their licence wants a notice that is not at hand.
 """
 
 from __future__ import annotations
@@ -18,16 +19,16 @@ import numpy as np
 from PIL import Image
 
 from docs.figure_layers import figure_3, figure_5a, figure_5b, figure_6b
-from docs.figure_ptm import ptm_direct, ptm_dome, ptm_lights, ptm_normals, ptm_quilt
+from docs.figure_ptm import ptm_direct, ptm_dome, ptm_lights, ptm_normals, ptm_photographs, ptm_quilt
 from docs.figure_rooms import room_day, room_localised, room_materials, room_shapes, room_sky, room_study
 from docs.figure_scenes import compare, figure_9, figure_10, hero
 from docs.studio import Studio
 from impostor.files.output import atomic_output
 
-FIGURES: dict[str, Callable[[Studio], Image.Image]] = {
+FIGURES: dict[str, Callable[[Studio], Image.Image | None]] = {
     figure.__name__: figure
     for figure in (figure_3, figure_5a, figure_5b, figure_6b, figure_9, figure_10, hero, compare)
-    + (ptm_dome, ptm_direct, ptm_lights, ptm_normals, ptm_quilt)
+    + (ptm_dome, ptm_direct, ptm_lights, ptm_normals, ptm_quilt, ptm_photographs)
     + (room_study, room_localised, room_materials, room_shapes, room_day, room_sky)
 }
 FOLDER = Path(__file__).with_name("figures")
@@ -59,7 +60,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     studio = Studio()
     for name in options.names or FIGURES:
-        encoded = png(FIGURES[name](studio))
+        picture = FIGURES[name](studio)
+        if picture is None:
+            print(f"{name} left out: IMPOSTOR_DATA names no folder that holds its photographs", file=sys.stderr)
+            continue
+        encoded = png(picture)
         path = options.out / f"{name}.png"
         with atomic_output(path, force=True) as temporary:
             temporary.write_bytes(encoded)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from impostor.ptm import Polynomials, Ptm
 
 OUTPUTS = ("lit", "normal", "albedo")
+PATCH = 48  # texels
 
 
 def _known_quality(quality: int | None) -> int | None:
@@ -180,7 +181,13 @@ def synthesise(
     ptm: PtmFile,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.ptm")],
     size: Annotated[str, typer.Option(metavar="WxH", help="Texels of the result.")] = "512x512",
-    patch: Annotated[int, typer.Option(help="Side of a patch: larger than what the surface is made of.")] = 48,
+    patch: Annotated[
+        int | None,
+        typer.Option(
+            help="Side of a patch: larger than what the surface is made of.",
+            show_default=f"{PATCH}, or half of the PTM's shorter side",
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(help="The same seed gives the same texture.")] = 0,
     jpeg: Jpeg = None,
     no_prediction: NoPrediction = False,
@@ -200,6 +207,8 @@ def synthesise(
     if max(width, height) > LARGEST_SIDE:
         raise SettingsError("--size", f"{size}; expected sides up to {LARGEST_SIDE}, as a .ptm can hold")
     read = read_ptm(ptm)
+    if patch is None:
+        patch = min(PATCH, min(read.size) // 2)
     with as_flags("size", "patch", "seed"), progress_bar(f"quilting {ptm.name}", quiet) as progress:
         made = quilted(read, (width, height), patch, seed, progress)
     written = _write(made, output, jpeg, no_prediction, force)

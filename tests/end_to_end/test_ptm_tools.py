@@ -126,6 +126,12 @@ def test_a_synthesised_ptm_has_the_size_asked_for(capsys, bumps, tmp_path):
     assert again.read_bytes() == (tmp_path / "a.ptm").read_bytes()
 
 
+def test_a_small_ptm_is_quilted_from_smaller_patches(capsys, tmp_path):
+    write_ptm(random_ptm(size=(40, 30)), tmp_path / "small.ptm")
+    ok(capsys, "ptm", "synthesise", tmp_path / "small.ptm", "-o", tmp_path / "a.ptm", "--size", "64x48")
+    assert read_ptm(tmp_path / "a.ptm").size == (64, 48)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -145,7 +151,7 @@ def test_a_synthesised_ptm_has_the_size_asked_for(capsys, bumps, tmp_path):
         (["relight-video", "{ptm}", "-o", "a.mp4", "--seconds", "-1"], "--seconds"),
         (["relight-video", "{ptm}", "-o", "a.mp4", "--rate", "0"], "--rate"),
         (["synthesise", "{ptm}", "-o", "b.ptm", "--size", "big"], "--size"),
-        (["synthesise", "{ptm}", "-o", "b.ptm", "--patch", "1"], "--patch"),
+        (["synthesise", "{ptm}", "-o", "b.ptm", "--patch", "0"], "--patch"),
         (["synthesise", "{ptm}", "-o", "b.ptm", "--seed", "-1", "--size", "64x64", "--patch", "24"], "--seed"),
         (["synthesise", "{ptm}", "-o", "b.ptm", "--size", "65536x64"], "65535"),
         (

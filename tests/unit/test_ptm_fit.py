@@ -1,12 +1,13 @@
 """Fits recover known polynomials, whatever the photographs are stored as, and refuse lights that cannot tell."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from bake import one_pass
+from bake import half_chroma, one_pass
 from bake.design import ONE_PARAMETER, make_design
 from bake.dome import ring_dome
 from bake.photographs import PhotographError, decoded, open_photographs
@@ -50,6 +51,57 @@ def test_any_number_of_threads_gives_the_same_bits(tmp_path, monkeypatch, format
     for other in others:
         for name in ("coefficients", "color", "chroma"):
             np.testing.assert_array_equal(getattr(other, name), getattr(one, name))
+
+
+def smooth_pictures(height, width, count=30):
+    """Colour and light that change slowly, so that little is lost by colour of half the size; (N, H, W, 3) uint8."""
+    across = np.linspace(0, 3, width)[None, :, None] + np.linspace(0, 2, height)[:, None, None] + np.array([0, 1, 2])
+    known = 0.12 * np.sin(across[..., None] * np.arange(1, 7)) + np.array([0, 0, 0, 0, 0, 0.5])
+    return photographed(known, UV[:count])
+
+
+@pytest.mark.parametrize("format", ["rgb", "lrgb", "lum"])
+@pytest.mark.parametrize("orientation", [1, 6])
+def test_jpegs_with_colour_of_half_the_size_are_fitted_as_what_they_decode_to(tmp_path, format, orientation):
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    paths = [tmp_path / f"{number:02d}.jpg" for number in range(30)]
+    for path, picture in zip(paths, smooth_pictures(24, 38), strict=True):
+        Image.fromarray(picture).save(path, quality=90, exif=exif)
+    photographs = open_photographs(paths)
+    assert photographs.half_chroma
+    found = fit_ptm(photographs, UV, format=format)
+    same = fit_ptm(replace(photographs, half_chroma=False), UV, format=format)
+    assert found.size == same.size == ((38, 24) if orientation == 1 else (24, 38))
+    for light in UV[::7]:
+        assert np.abs(evaluate(found, *light) - evaluate(same, *light)).max() < 1.5 / 255
+
+
+def test_any_number_of_threads_gives_the_same_bits_of_jpegs(tmp_path, monkeypatch):
+    monkeypatch.setattr(one_pass, "BLOCK", 32)
+    monkeypatch.setattr(half_chroma, "BLOCK", 80)
+    photographs = open_photographs(write_photographs(tmp_path, smooth_pictures(24, 38), ".jpg"))
+    one, *others = (fit_ptm(photographs, UV, format="lrgb", workers=workers) for workers in (1, 2, 7))
+    for other in others:
+        for name in ("coefficients", "color"):
+            np.testing.assert_array_equal(getattr(other, name), getattr(one, name))
+
+
+@pytest.mark.parametrize(
+    ("size", "settings"),
+    [((24, 37), {}), ((24, 38), {"subsampling": 0}), ((24, 38), {"subsampling": 1}), ((24, 38), {"keep_rgb": True})],
+)
+def test_other_jpegs_are_fitted_as_red_green_and_blue(tmp_path, size, settings):
+    path = tmp_path / "a.jpg"
+    Image.fromarray(smooth_pictures(*size, 1)[0]).save(path, **settings)
+    assert not open_photographs([path]).half_chroma
+
+
+def test_a_jpeg_whose_end_is_missing_is_refused_by_name(tmp_path):
+    paths = write_photographs(tmp_path, smooth_pictures(24, 38), ".jpg")
+    paths[7].write_bytes(paths[7].read_bytes()[:-200])
+    with pytest.raises(PhotographError, match=r"image07\.jpg"):
+        fit_ptm(open_photographs(paths), UV)
 
 
 @pytest.mark.parametrize("batch", [1, 4, 7, 30])
