@@ -44,6 +44,7 @@ class Shown:
 
     view: str = "lit"
     shadows: bool = True
+    dither: bool = False
     split: float | None = None
     statistics: bool = True
     help: bool = True
@@ -138,7 +139,7 @@ class Walk:
                 self.follows_path = False
         elif action in VIEWS:
             self.shown.view = action
-        elif action in ("shadows", "statistics", "help"):
+        elif action in ("shadows", "dither", "statistics", "help"):
             setattr(self.shown, action, not getattr(self.shown, action))
         elif action == "fly":
             self.walker.flying = not self.walker.flying
@@ -264,6 +265,7 @@ class Walk:
         """Draw the picture, without what lies over it."""
         begun, shown, camera, lighting = time.perf_counter(), self.shown, self.camera, self.sun.lighting
         self.stage.light(lighting.lights, lighting.ambient, lighting.background, self.sun.room_yaws)
+        self.stage.renderer.filtered = not shown.dither
         with counted_draw_calls() as calls:
             self.stage.draw(self.canvas, camera, shown.view, shown.shadows, shown.split)
         if shown.view == "depth":
@@ -322,7 +324,7 @@ class Walk:
                 ("GPU memory", f"{sum(self.memory.values()) / 2**20:,.0f} MiB"),
                 ("sun", self.sun.words),
                 ("eye", f"{eye} m, {'flying' if self.walker.flying else 'walking'}"),
-                ("view", self.shown.view),
+                ("view", f"{self.shown.view}{', every texel' * self.shown.dither}"),
             )
         return self._rows
 
