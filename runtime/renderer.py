@@ -19,8 +19,9 @@ from impostor.ptm.quantise import Ptm
 from impostor.shadow_projection import Ground
 from runtime.animation import AnimatedInstances
 from runtime.bump import Bump
-from runtime.checks import check_number, check_type, check_whole, invertible, with_article
+from runtime.checks import check_type, check_whole, invertible, with_article
 from runtime.environments import RoomTable, check_rooms
+from runtime.fan_settings import FanSettings
 from runtime.gl_state import CallerState, preserved_state
 from runtime.grounds import GroundPass, GroundSurface
 from runtime.impostors import ImpostorPass
@@ -37,7 +38,7 @@ from runtime.surfaces import Surface, SurfacePass
 from runtime.tiles import TileCache
 
 
-class ImpostorRenderer(LightSettings):
+class ImpostorRenderer(LightSettings, FanSettings):
     """Draws relightable fans, meshes and their shadows into whatever framebuffer the caller has bound.
 
     Every `draw...` call takes the caller's two camera matrices, (4, 4) column-vector matrices as read on paper, draws
@@ -404,23 +405,6 @@ class ImpostorRenderer(LightSettings):
         else:
             self._table.update(self.lights, self.ambient, self._rooms)
         self._room_table.update(self._rooms)
-
-    @property
-    def filtered(self) -> bool:
-        return self._impostors.filtered
-
-    @filtered.setter
-    def filtered(self, filtered: bool) -> None:
-        self._impostors.filtered = bool(filtered)
-
-    @property
-    def view_fade_seconds(self) -> float:
-        return self._impostors.view_fade_seconds
-
-    @view_fade_seconds.setter
-    def view_fade_seconds(self, seconds: float) -> None:
-        check_number("view_fade_seconds", "time", seconds, 0, 1e9)
-        self._impostors.view_fade_seconds = float(seconds)
 
     @property
     def statistics(self) -> dict[str, int]:

@@ -24,6 +24,7 @@ from runtime.canvas import Canvas
 from runtime.contact_shadows import ContactShadows
 from runtime.gl_state import preserved_state
 from runtime.instances import Instances, Viewer, quads_toward
+from runtime.leaning import leaning
 from runtime.lod import LevelOfDetail
 from runtime.meshes import MeshInstance
 from runtime.overdraw import OverdrawPass
@@ -262,6 +263,11 @@ class Stage:
                 mesh.visible = True
         # The captures have chosen levels of detail for their own cameras; the picture chooses anew.
         renderer.advance(np.inf)
+
+    def leaning(self, camera: Camera, size: tuple[int, int]) -> dict[str, float]:
+        """Fans without a mesh to be in their stead that are seen from far beside their views; see `leaning`."""
+        viewer = Viewer.from_matrices(*camera.matrices, (0, 0, *size))
+        return leaning((each.shown for each in self._copies.things.values() if not each.placement.lod), viewer)
 
     def triangles_not_drawn(self, camera: Camera, size: tuple[int, int]) -> int:
         """Of all meshes whose fans are seen in a picture of `size` pixels.

@@ -324,9 +324,19 @@ class Walk:
                 ("GPU memory", f"{sum(self.memory.values()) / 2**20:,.0f} MiB"),
                 ("sun", self.sun.words),
                 ("eye", f"{eye} m, {'flying' if self.walker.flying else 'walking'}"),
+                *(("leaning", f"{name}, {off:.0f}° off its views") for name, off in self._most_leaning),
                 ("view", f"{self.shown.view}{', every texel' * self.shown.dither}"),
             )
         return self._rows
+
+    @property
+    def leaning(self) -> dict[str, float]:
+        """Fans seen from far beside their views, and by how many degrees."""
+        return self.stage.leaning(self.camera, self.canvas.size)
+
+    @property
+    def _most_leaning(self) -> list[tuple[str, float]]:
+        return sorted(self.leaning.items(), key=lambda each: -each[1])[:1]
 
     @property
     def triangles_not_drawn(self) -> int:

@@ -16,6 +16,7 @@ from impostor.views import direction
 from runtime import LevelOfDetail
 from runtime.cameras import Camera
 from runtime.instances import Instances, Viewer
+from runtime.leaning import leaning
 from runtime.lod import FrameClock, Levels
 from runtime.offscreen import Offscreen
 from tests import gl as raw
@@ -136,6 +137,28 @@ class TestWantedLevel:
         copies.visible[:] = False
         renderer.draw(*filling(2.0))
         assert not screen.color().any()
+
+
+class TestLeaning:
+    """Copies that a mesh would be drawn in place of, were there one."""
+
+    def test_the_worst_copy_of_each_fan_is_named(self):
+        copies = [Instances(FAN, [(0, 0, 0), (0, -3, 0)]), Instances(OTHER, (9, 0, 0)), Instances(FAN, (0, 0, -1))]
+        found = leaning(copies, viewer_at(8 * direction(0.3, np.radians(40)), (0, -1, 0)))
+        assert set(found) == {"solids"}
+        assert 40 < found["solids"] < 60
+
+    @pytest.mark.parametrize(
+        ("eye", "size"),
+        [(8 * direction(0, np.radians(19)), 600), (8 * direction(0, np.radians(70)), 60), ((0, 30, -8), 600)],
+        ids=["near its views", "small", "behind"],
+    )
+    def test_what_does_not_show_is_not_named(self, eye, size):
+        target = (0, 0, 0) if eye[2] > 0 else (0, 30, -20)
+        assert leaning([Instances(FAN)], viewer_at(eye, target, size)) == {}
+
+    def test_no_copies_lean_nowhere(self):
+        assert leaning([Instances(FAN, np.zeros((0, 3)))], viewer_at((0, 9, 1))) == {}
 
 
 class TestHysteresis:
