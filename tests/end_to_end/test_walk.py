@@ -152,11 +152,10 @@ def player(display, scene, tmp_path):
         )
         processes.append(process)
         player = Player(display, process)
-        with_help = player.see()
-        player.press("h")
-        without_help = player.until(lambda seen: (seen != with_help).any())
-        player.press("i")
-        player.until(lambda seen: (seen != without_help).any())
+        for key in "hhi":
+            before = player.see()
+            player.press(key)
+            player.until(lambda seen, before=before: (seen != before).any())
         time.sleep(0.3)
         return player
 

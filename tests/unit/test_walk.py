@@ -13,7 +13,7 @@ from impostor.normal_code import BYTE_TO_NORMAL
 from runtime.draw_calls import counted_draw_calls
 from runtime.overlay import panel_picture
 from runtime.scene_changes import SceneChanges
-from runtime.walk import Walk
+from runtime.walk import HINT_SECONDS, Walk
 from runtime.walk_keys import HELD, KEYS, WINDOW
 from runtime.walker import MOVES, TURNS
 from tests.data import ROOT
@@ -178,17 +178,32 @@ def test_distances_are_half_grey_at_seven_walking_heights(walk):
 def test_help_and_statistics_lie_over_the_picture_and_not_in_it(walk):
     plain = drawn(walk)
     assert (presented(walk) != plain).any()
-    walk.press("help")
     walk.press("statistics")
+    hint = (presented(walk) != plain).any(axis=-1)
+    # A line in the corner.
+    assert hint.any() and not hint[32:].any()
+    walk.press("help")
+    assert (presented(walk) != plain).any(axis=-1).sum() > 2 * hint.sum()
+    walk.press("help")
     np.testing.assert_array_equal(presented(walk), plain)
     walk.press("statistics")
     assert (presented(walk) != plain).any()
     np.testing.assert_array_equal(walk.picture(), plain)
 
 
-def test_the_divider_is_drawn_where_it_was_dragged(walk):
-    walk.press("help")
+def test_the_hint_goes_by_itself(walk):
     walk.press("statistics")
+    plain = drawn(walk)
+    for seconds in (1.0, 6.0):
+        walk.step(seconds)
+        assert (presented(walk) != plain).any()
+    walk.step(1.1)
+    np.testing.assert_array_equal(presented(walk), plain)
+
+
+def test_the_divider_is_drawn_where_it_was_dragged(walk):
+    walk.press("statistics")
+    walk.step(HINT_SECONDS)
     walk.press("split")
     walk.move_divider(-16)
     white = (presented(walk) == 255).all(axis=-1)[:10]
