@@ -142,11 +142,12 @@ class TestWantedLevel:
 class TestLeaning:
     """Copies that a mesh would be drawn in place of, were there one."""
 
-    def test_the_worst_copy_of_each_fan_is_named(self):
-        copies = [Instances(FAN, [(0, 0, 0), (0, -3, 0)]), Instances(OTHER, (9, 0, 0)), Instances(FAN, (0, 0, -1))]
-        found = leaning(copies, viewer_at(8 * direction(0.3, np.radians(40)), (0, -1, 0)))
-        assert set(found) == {"solids"}
-        assert 40 < found["solids"] < 60
+    def test_fans_are_named_of_which_half_of_the_copies_lean(self):
+        eye = 8 * direction(0, np.radians(40))
+        copies = [Instances(FAN, (0, 0, 0)), Instances(FAN, (0.1, 0, 0)), Instances(OTHER, (9, 0, 0))]
+        assert leaning(copies, viewer_at(eye)) == {"solids": pytest.approx(40, abs=1)}
+        level = Instances(FAN, np.tile((0, 5.1, 0), (3, 1)))
+        assert leaning([*copies, level], viewer_at(eye, (0, 2.5, 0), fov_deg=80)) == {}
 
     @pytest.mark.parametrize(
         ("eye", "size"),
