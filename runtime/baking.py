@@ -22,7 +22,7 @@ def described(subject: Subject) -> str:
     return f"baking {subject.model} ({bake.views} views of {bake.size}x{bake.size}) into {subject.fan}"
 
 
-def bake_command(subject: Subject) -> list[str]:
+def bake_command(subject: Subject, quiet: bool = False) -> list[str]:
     """The command line that makes a subject's fan."""
     bake = subject.bake
     assert bake is not None
@@ -33,7 +33,7 @@ def bake_command(subject: Subject) -> list[str]:
         command += ["--elevation", str(bake.elevation_deg)]
     if bake.samples is not None:
         command += ["--samples", str(bake.samples)]
-    return command
+    return [*command, "--quiet"] if quiet else command
 
 
 class Bakery:
@@ -42,6 +42,8 @@ class Bakery:
     Parameters
     ----------
     subjects : list of Subject
+    quiet : bool
+        Say only what goes wrong.
 
     Attributes
     ----------
@@ -51,8 +53,8 @@ class Bakery:
         A bake has ended badly, and said why on standard error; the rest is left.
     """
 
-    def __init__(self, subjects: list[Subject]):
-        self._waiting = list(subjects)
+    def __init__(self, subjects: list[Subject], quiet: bool = False):
+        self._waiting, self._quiet = list(subjects), quiet
         self._process: subprocess.Popen[bytes] | None = None
         self.current: Subject | None = None
         self.failed = False
@@ -62,9 +64,10 @@ class Bakery:
         self._process, self.current = None, None
         if self._waiting:
             self.current = self._waiting.pop(0)
-            print(f"impostor: {described(self.current)}", file=sys.stderr, flush=True)
+            if not self._quiet:
+                print(f"impostor: {described(self.current)}", file=sys.stderr, flush=True)
             # Its summary is no result of this command; its progress bar shows on standard error.
-            self._process = subprocess.Popen(bake_command(self.current), stdout=subprocess.DEVNULL)
+            self._process = subprocess.Popen(bake_command(self.current, self._quiet), stdout=subprocess.DEVNULL)
 
     def poll(self, wait: bool = False) -> bool:
         """Whether all is done, or nothing more will be; `wait` comes back when it is."""

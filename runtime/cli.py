@@ -83,6 +83,7 @@ def render(
     up: UpAxis = None,
     allow_missing_textures: AllowMissing = False,
     force: Force = False,
+    quiet: Quiet = False,
 ) -> None:
     """Draw a fan, a mesh through the same camera and lights, or what a scene's camera sees first, as a PNG."""
     if subject.suffix.lower() == ".toml":
@@ -96,7 +97,8 @@ def render(
             if value is not None:
                 raise SettingsError(flag, f"given with {subject}; expected it with a fan or a model, not with a scene")
         given = {"eye": eye and _numbers("--eye", eye, 3), "target": target and _numbers("--target", target, 3)}
-        render_scene(subject, output_file, _size(size), output, not no_shadow, {**given, "fov_deg": fov}, force)
+        camera = {**given, "fov_deg": fov}
+        render_scene(subject, output_file, _size(size), output, not no_shadow, camera, force, quiet)
         return
     from impostor.files.pictures import save_png
     from runtime.pictures import PictureSettings, draw_picture

@@ -15,7 +15,7 @@ from runtime.batch import Batch, Shown
 from runtime.environments import RoomTable
 from runtime.gl_state import CallerState, set_state
 from runtime.gpu import InstanceBuffer, load_program, set_uniforms
-from runtime.instances import Quads, Viewer
+from runtime.instances import Quads, UnturnedQuads, Viewer
 from runtime.lights import LightTable
 from runtime.quad_records import QUAD_DTYPE, QUAD_FORMAT
 from runtime.relight import CORNERS
@@ -83,6 +83,8 @@ class ImpostorPass:
     ----------
     view_fade_seconds : float
         The longest that a copy fades from one view to the next.
+    filtered : bool
+        Whether tiles are filtered when they are drawn, which smooths the dither of their normals.
     statistics : dict of int
         Of the last draw: `instances` drawn, those of them that were `fading`, `triangles_spared` because a fan was
         drawn whole where there was a mesh, `tiles` the instances needed, `relit` tiles, `coarser` mip levels that a
@@ -103,7 +105,8 @@ class ImpostorPass:
         self._lit: tuple[object, ...] | None = None
         self._tiles: list[ShownTiles] = []
         self._normals_for: NDArray[np.float64] | None = None
-        self.view_fade_seconds = VIEW_FADE_SECONDS
+        self._codes = False
+        self.view_fade_seconds, self.filtered = VIEW_FADE_SECONDS, True
         self.statistics = dict.fromkeys(STATISTICS, 0)
 
     def draw(
@@ -120,12 +123,14 @@ class ImpostorPass:
 
         `seconds` have passed since the last frame; None is another look at the same one, which changes no fade.
         `rooms` holds those of the lights, where they have any. `output` is "lit", "albedo" (the same, under a light
-        table that is plain white) or "normal".
+        table that is plain white), "normal" or "code".
         """
-        if output == "normal" or self._normals_for is not None:
+        self._codes = output == "code"
+        normals_for = np.eye(3) if self._codes else viewer.view_from_world[:3, :3] if output == "normal" else None
+        if normals_for is not None or self._normals_for is not None:
             # Normals turn with the viewer, so nothing lit before can be kept.
             self.forget()
-        self._normals_for = viewer.view_from_world[:3, :3] if output == "normal" else None
+        self._normals_for = normals_for
         self._rooms, self._cells.side = lights.rooms, shared_side(lights.rooms)
         frame = (viewer.key, self._cells.side, *(batch.key for batch in batches))
         if frame != self._frame:
@@ -147,6 +152,9 @@ class ImpostorPass:
             self._lit = None if waiting else (self._frame, lights.version)
         state.bind_target()
         set_state(depth_test=True, depth_write=True, blend=(moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA))
+        smooth = moderngl.LINEAR if self.filtered and not self._codes else moderngl.NEAREST
+        if cache.color.filter != (smooth, smooth):
+            cache.color.filter = smooth, smooth
         cache.color.use(0)
         cache.depth.use(1)
         self._whole.render()
@@ -248,6 +256,8 @@ class ImpostorPass:
         one_quad = np.full(len(index.places), -1)
         one_quad[entries] = np.arange(len(entries))
         shown_by = one_quad[one_quad >= 0]
+        if self._codes:
+            quads = UnturnedQuads(quads.placement, quads.index, quads.view)
         return ShownTiles(fan, instances.gloss, index, quads, levels, entries, shown_by, instances.reflection)
 
     def release(self) -> None:

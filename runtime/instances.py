@@ -320,7 +320,15 @@ class Quads:
 
     def take(self, which: NDArray[Any]) -> Quads:
         """Some of them, by index or mask."""
-        return Quads(self.placement, self.index[which], self.view[which])
+        return type(self)(self.placement, self.index[which], self.view[which])
+
+
+class UnturnedQuads(Quads):
+    """Quads whose normals stay as the fan stores them, each in its own view."""
+
+    @cached_property
+    def basis(self) -> NDArray[np.float64]:
+        return np.broadcast_to(np.eye(3), (len(self), 3, 3))
 
 
 def nearest_views(instances: Instances, eye: NDArray[np.float64], index: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -98,6 +98,33 @@ class FrameClock:
         return seconds
 
 
+class ScreenSize:
+    """How large copies of a fan are on screen, and from how far beside its views they are seen.
+
+    Parameters
+    ----------
+    fan : Fan
+    """
+
+    def __init__(self, fan: Fan):
+        self._size = float(np.ptp(fan.bounds, axis=0).max())
+        self._elevations = np.unique(np.arcsin(np.clip(fan.views.basis[:, 2, 1], -1, 1)).round(6))
+
+    def seen(self, viewer: Viewer, placement: Placement) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Size in pixels, and how far the viewer is from the fan's elevations in radians: (N,) each."""
+        toward = viewer.eye[:3, None] - viewer.eye[3] * placement.middles
+        distance = np.maximum(np.sqrt(np.square(toward).sum(axis=0)), 1e-12)
+        # Clip w per metre of depth; of an orthographic camera w is the same everywhere.
+        per_metre = np.linalg.norm(viewer.clip_from_world[3, :3])
+        w = per_metre * distance if viewer.eye[3] else np.abs(viewer.clip_from_world[3, 3])
+        focal = viewer.viewport[3] / 2 * abs(viewer.clip_from_view[1, 1])
+        elevation = np.arcsin(np.clip(toward[1] / distance, -1, 1))
+        # Half way between two elevations the other one becomes the nearest.
+        nearest = np.searchsorted((self._elevations[1:] + self._elevations[:-1]) / 2, elevation)
+        off = np.abs(self._elevations[nearest] - elevation)
+        return self._size * placement.scales * focal / w, off
+
+
 class Levels:
     """The level of every copy of a fan, kept from frame to frame.
 
@@ -118,11 +145,8 @@ class Levels:
 
     def __init__(self, instances: Instances, buffers: MeshBuffers, settings: LevelOfDetail):
         self.instances, self.buffers, self.settings = instances, buffers, settings
-        fan = instances.fan
         self.as_mesh, self.fan_share = np.zeros(len(instances), bool), np.ones(len(instances), np.float32)
-        self._size = float(np.ptp(fan.bounds, axis=0).max())
-        self._elevations = np.unique(np.arcsin(np.clip(fan.views.basis[:, 2, 1], -1, 1)).round(6))
-        self._chosen = False
+        self._screen_size, self._chosen = ScreenSize(instances.fan), False
 
     @property
     def key(self) -> bytes:
@@ -143,7 +167,7 @@ class Levels:
         if seconds is None and self._chosen:
             return
         placement = self.instances.placement
-        self.as_mesh = self._wanted(*self._size_and_elevation_off(viewer, placement)) & (placement.radii > 0)
+        self.as_mesh = self._wanted(*self._screen_size.seen(viewer, placement)) & (placement.radii > 0)
         target = np.where(self.as_mesh, np.float32(0), np.float32(1))
         if seconds is None or not self._chosen or seconds >= self.settings.fade_seconds:
             self.fan_share = target
@@ -164,22 +188,6 @@ class Levels:
             for index, part in ((near[whole], None), (near[~whole], parts[~whole]))
             if len(index)
         ]
-
-    def _size_and_elevation_off(
-        self, viewer: Viewer, placement: Placement
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Size on screen in pixels, and how far the camera is from the fan's elevations in radians: (N,) each."""
-        toward = viewer.eye[:3, None] - viewer.eye[3] * placement.middles
-        distance = np.maximum(np.sqrt(np.square(toward).sum(axis=0)), 1e-12)
-        # Clip w per metre of depth; of an orthographic camera w is the same everywhere.
-        per_metre = np.linalg.norm(viewer.clip_from_world[3, :3])
-        w = per_metre * distance if viewer.eye[3] else np.abs(viewer.clip_from_world[3, 3])
-        focal = viewer.viewport[3] / 2 * abs(viewer.clip_from_view[1, 1])
-        elevation = np.arcsin(np.clip(toward[1] / distance, -1, 1))
-        # Half way between two elevations the other one becomes the nearest.
-        nearest = np.searchsorted((self._elevations[1:] + self._elevations[:-1]) / 2, elevation)
-        off = np.abs(self._elevations[nearest] - elevation)
-        return self._size * placement.scales * focal / w, off
 
     def _wanted(self, size: NDArray[np.float64], off: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Which copies (N,) are to be meshes; what is one already stays one for longer."""

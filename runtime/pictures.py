@@ -18,6 +18,7 @@ from impostor.model import Model
 from impostor.shadow_projection import Ground
 from runtime.cameras import Camera
 from runtime.grounds import GroundSurface
+from runtime.leaning import FARTHEST_OFF_DEG
 from runtime.light_settings import DEFAULT_AMBIENT, DEFAULT_LIGHTS
 from runtime.offscreen import Offscreen
 from runtime.recentring import moved_camera, moved_room, recentred
@@ -27,7 +28,6 @@ OUTPUTS = ("lit", "albedo", "normal", "depth", "alpha")
 MESH_SAMPLES = 4
 GROUND_ALBEDO = (0.55, 0.54, 0.5)
 GROUND_REACH = 12  # bounding radii
-FARTHEST_OFF_DEG = 20  # above or below the views: plausible so far, as the paper has it, though some 14 dB off
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,9 @@ def _warn_of_elevation(fan: Fan, camera: Camera) -> None:
     off = max(min(views) - seen, seen - max(views))
     if off > FARTHEST_OFF_DEG:
         found = f"{fan.name}: seen from an elevation of {seen:.3g} degrees, {off:.3g} away from its views"
-        warnings.warn(ViewWarning(f"{found}; expected at most {FARTHEST_OFF_DEG}, or a fan baked there"), stacklevel=3)
+        warnings.warn(
+            ViewWarning(f"{found}; expected at most {FARTHEST_OFF_DEG:g}, or a fan baked there"), stacklevel=3
+        )
 
 
 def _draw_ground(renderer: ImpostorRenderer, subject: Fan | Model, camera: Camera, settings: PictureSettings) -> None:

@@ -19,8 +19,9 @@ from impostor.ptm.quantise import Ptm
 from impostor.shadow_projection import Ground
 from runtime.animation import AnimatedInstances
 from runtime.bump import Bump
-from runtime.checks import check_number, check_type, check_whole, invertible, with_article
+from runtime.checks import check_type, check_whole, invertible, with_article
 from runtime.environments import RoomTable, check_rooms
+from runtime.fan_settings import FanSettings
 from runtime.gl_state import CallerState, preserved_state
 from runtime.grounds import GroundPass, GroundSurface
 from runtime.impostors import ImpostorPass
@@ -37,7 +38,7 @@ from runtime.surfaces import Surface, SurfacePass
 from runtime.tiles import TileCache
 
 
-class ImpostorRenderer(LightSettings):
+class ImpostorRenderer(LightSettings, FanSettings):
     """Draws relightable fans, meshes and their shadows into whatever framebuffer the caller has bound.
 
     Every `draw...` call takes the caller's two camera matrices, (4, 4) column-vector matrices as read on paper, draws
@@ -65,6 +66,9 @@ class ImpostorRenderer(LightSettings):
         How many of the brightest lights of each room cast shadows; 0 for none.
     contact_shadows : ContactShadows or None
         Whether `draw_shadows` also darkens the ground around the feet of what stands on it, and how.
+    filtered : bool
+        Whether fans are filtered when they are drawn. Without, each texel shows as it was lit, and the dither of the
+        stored normals is seen.
     view_fade_seconds : float
         The longest that a copy takes from one view of its fan to the next, its pixels dealt out between the two; 0
         switches at once, as does a renderer that is not told the time. See `advance`.
@@ -250,8 +254,9 @@ class ImpostorRenderer(LightSettings):
         Parameters
         ----------
         clip_from_view, view_from_world : array_like, (4, 4) float
-        output : {"lit", "albedo", "normal"}
-            Normals are the viewer's, as n / 2 + 1/2.
+        output : {"lit", "albedo", "normal", "code"}
+            Normals are the viewer's, as n / 2 + 1/2. Codes are the fans' normals as they are stored, dithered and each
+            in its own view, texel by texel; meshes have none, and are lit.
 
         Raises
         ------
@@ -261,12 +266,15 @@ class ImpostorRenderer(LightSettings):
             The renderer has been released.
         """
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
-            self._update_lights(output)
+            if output not in (*OUTPUTS, "code"):
+                raise SettingsError("output", f"{output!r}; expected one of {', '.join(OUTPUTS)}, code")
+            of_meshes = "lit" if output == "code" else output
+            self._update_lights(of_meshes)
             levels, seconds = self._placed.levels, self._clock.take()
             for each in levels:
                 each.update(viewer, seconds)
             near = [copies for each in levels for copies in each.copies()]
-            self._mesh_pass.draw_copies(state, near, viewer, self._table, self._room_table, output)
+            self._mesh_pass.draw_copies(state, near, viewer, self._table, self._room_table, of_meshes)
             self._statistics = self._mesh_pass.statistics
             self._impostors.draw(state, self._placed.batches, viewer, self._table, self._room_table, output, seconds)
 
@@ -396,15 +404,6 @@ class ImpostorRenderer(LightSettings):
         else:
             self._table.update(self.lights, self.ambient, self._rooms)
         self._room_table.update(self._rooms)
-
-    @property
-    def view_fade_seconds(self) -> float:
-        return self._impostors.view_fade_seconds
-
-    @view_fade_seconds.setter
-    def view_fade_seconds(self, seconds: float) -> None:
-        check_number("view_fade_seconds", "time", seconds, 0, 1e9)
-        self._impostors.view_fade_seconds = float(seconds)
 
     @property
     def statistics(self) -> dict[str, int]:

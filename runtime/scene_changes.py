@@ -22,6 +22,8 @@ class SceneChanges:
     Parameters
     ----------
     watcher : SceneWatcher
+    quiet : bool
+        Say only what goes wrong.
 
     Attributes
     ----------
@@ -29,8 +31,8 @@ class SceneChanges:
         Why the scene as its files have it cannot be shown; empty where it can.
     """
 
-    def __init__(self, watcher: SceneWatcher):
-        self._watcher = watcher
+    def __init__(self, watcher: SceneWatcher, quiet: bool = False):
+        self._watcher, self._quiet = watcher, quiet
         self._waiting: Change | None = None
         self._bakery: Bakery | None = None
         self.message = ""
@@ -49,7 +51,7 @@ class SceneChanges:
             parts = self._watcher.parts | (self._waiting.parts if self._waiting else frozenset())
             self.stop()
             self.message, self._waiting = "", Change(scene, parts)
-            self._bakery = Bakery(unbaked(scene))
+            self._bakery = Bakery(unbaked(scene), self._quiet)
         if self._waiting is None or self._bakery is None or not self._bakery.poll():
             return None
         change, failed = self._waiting, self._bakery.failed

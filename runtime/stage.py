@@ -25,6 +25,7 @@ from runtime.canvas import Canvas
 from runtime.contact_shadows import ContactShadows
 from runtime.gl_state import preserved_state
 from runtime.instances import Instances, Viewer, quads_toward
+from runtime.leaning import leaning
 from runtime.lod import LevelOfDetail
 from runtime.meshes import MeshInstance
 from runtime.overdraw import OverdrawPass
@@ -33,7 +34,9 @@ from runtime.stage_ground import GREY, ground_surface, under
 from runtime.stage_rooms import StageRooms, environments_of
 from runtime.surfaces import Surface, lying_on, rectangle
 
-VIEWS = ("lit", "albedo", "normals", "depth", "overdraw")
+VIEWS = ("lit", "albedo", "normals", "depth", "overdraw", "codes")
+DARK = (0.1, 0.1, 0.1)
+DIM = 0.15  # light on what has no normal codes, where they are shown
 ALWAYS_MESH = LevelOfDetail(mesh_above_px=0.0)
 ALWAYS_FAN = LevelOfDetail(mesh_above_px=np.inf, elevation_above_px=np.inf)
 UNSEEN = (0.0, 0.0, 0.0, 0.0)
@@ -189,8 +192,9 @@ class Stage:
         ----------
         canvas : Canvas
         camera : Camera
-        view : {"lit", "albedo", "normals", "depth", "overdraw"}
-            "depth" draws the lit picture, whose depth can then be shown.
+        view : {"lit", "albedo", "normals", "depth", "overdraw", "codes"}
+            "depth" draws the lit picture, whose depth can then be shown; "codes" the fans' stored normals, as
+            `ImpostorRenderer.draw` does, and all else in the dark.
         shadows : bool
         split : float, optional
             Everything left of this part of the width is drawn as meshes, everything right of it as fans. Wants
@@ -203,7 +207,8 @@ class Stage:
         output = "normal" if view == "normals" else "lit"
         # White light from everywhere shows the albedo, of a ground as of everything else.
         lit = view in ("lit", "depth")
-        renderer.lights, renderer.ambient = (self._lights, self._ambient) if lit else ((), 1.0)
+        flat = DIM if view == "codes" else 1.0
+        renderer.lights, renderer.ambient = (self._lights, self._ambient) if lit else ((), flat)
         renderer.shadow_lights = self.scene.shadow_lights
         contact = self.scene.contact_shadow
         renderer.contact_shadows = ContactShadows(contact) if contact > 0 else None
@@ -211,15 +216,16 @@ class Stage:
             self._capture_rooms()
         renderer.rooms = self._rooms.all if lit else ()
         self._show("shown" if split is None else "fans")
-        canvas.clear(self._background if view != "normals" else (*GREY, 1.0))
+        canvas.clear({"normals": (*GREY, 1.0), "codes": (*DARK, 1.0)}.get(view, self._background))
         if lit and self._rooms.visible:
             renderer.draw_rooms(*matrices, self._rooms.visible)
         self._draw_beneath(camera, output, shadows and lit)
+        of_fans = "code" if view == "codes" else output
         if split is None:
-            renderer.draw(*matrices, output)
+            renderer.draw(*matrices, of_fans)
             self.statistics = renderer.statistics
         else:
-            self._draw_split(canvas, camera, output, round(split * canvas.size[0]))
+            self._draw_split(canvas, camera, of_fans, round(split * canvas.size[0]))
         canvas.resolve()
 
     def _draw_beneath(self, camera: Camera, output: str, shadows: bool) -> None:
@@ -262,6 +268,11 @@ class Stage:
                 mesh.visible = True
         # The captures have chosen levels of detail for their own cameras; the picture chooses anew.
         renderer.advance(np.inf)
+
+    def leaning(self, camera: Camera, size: tuple[int, int]) -> dict[str, float]:
+        """Fans without a mesh to be in their stead that are seen from far beside their views; see `leaning`."""
+        viewer = Viewer.from_matrices(*camera.matrices, (0, 0, *size))
+        return leaning((each.shown for each in self._copies.things.values() if not each.placement.lod), viewer)
 
     def triangles_not_drawn(self, camera: Camera, size: tuple[int, int]) -> int:
         """Of all meshes whose fans are seen in a picture of `size` pixels.

@@ -30,7 +30,8 @@ LOOK_RATE = np.radians(0.15)  # a pixel of the mouse
 SUN_RATE = np.radians(0.25)
 CLOCK_RATE = 2.0  # hours a second, while a key is held
 SPEED, HALF_GREY = 1.8, 7.0  # walking heights: a second, and away in the view of distances
-MESSAGE_SECONDS = 4.0
+MESSAGE_SECONDS, HINT_SECONDS = 4.0, 8.0
+HINT = "H: help"
 PATIENCE = 0.25  # seconds between two looks at the scene's files, and between two texts of the statistics
 LINE = 80  # characters of a message
 SMALLEST_FONT = 9
@@ -44,9 +45,10 @@ class Shown:
 
     view: str = "lit"
     shadows: bool = True
+    dither: bool = False
     split: float | None = None
     statistics: bool = True
-    help: bool = True
+    help: bool = False
 
 
 class Walk:
@@ -99,7 +101,7 @@ class Walk:
         self.shown, self.statistics, self.sun = Shown(), FrameStatistics(), SunControl(scene)
         self.follows_path, self._path_time = False, 0.0
         self._message: tuple[str, ...] = ()
-        self._message_left, self._complaint = 0.0, ""
+        self._message_left, self._complaint, self._hint_left = 0.0, "", HINT_SECONDS
         self._since_look, self._since_rows, self._rows = 0.0, np.inf, ()
         self.canvas = Canvas(ctx, *size, samples)
         try:
@@ -138,8 +140,9 @@ class Walk:
                 self.follows_path = False
         elif action in VIEWS:
             self.shown.view = action
-        elif action in ("shadows", "statistics", "help"):
+        elif action in ("shadows", "dither", "statistics", "help"):
             setattr(self.shown, action, not getattr(self.shown, action))
+            self._hint_left *= action != "help"
         elif action == "fly":
             self.walker.flying = not self.walker.flying
             self.say("flying" if self.walker.flying else "walking")
@@ -217,6 +220,7 @@ class Walk:
         self.sun.step(seconds)
         self.stage.renderer.advance(seconds)
         self._message_left -= seconds
+        self._hint_left -= seconds
         self._since_look += seconds
         self._since_rows += seconds
         if self._since_look >= PATIENCE and self._changes is not None:
@@ -264,6 +268,7 @@ class Walk:
         """Draw the picture, without what lies over it."""
         begun, shown, camera, lighting = time.perf_counter(), self.shown, self.camera, self.sun.lighting
         self.stage.light(lighting.lights, lighting.ambient, lighting.background, self.sun.room_yaws, self.sun.sky)
+        self.stage.renderer.filtered = not shown.dither
         with counted_draw_calls() as calls:
             self.stage.draw(self.canvas, camera, shown.view, shown.shadows, shown.split)
         if shown.view == "depth":
@@ -301,6 +306,8 @@ class Walk:
             panels.append(Panel(self._statistics_rows(), (0, 0), (MARGIN, MARGIN)))
         if self.shown.help:
             panels.append(Panel(HELP, (1, 0), (-MARGIN, MARGIN)))
+        elif self._hint_left > 0:
+            panels.append(Panel((HINT,), (1, 0), (-MARGIN, MARGIN)))
         if self.shown.split is not None:
             for text, side in (("meshes", 1.0), ("impostors", 0.0)):
                 offset = -MARGIN if side else MARGIN
@@ -322,9 +329,19 @@ class Walk:
                 ("GPU memory", f"{sum(self.memory.values()) / 2**20:,.0f} MiB"),
                 ("sun", self.sun.words),
                 ("eye", f"{eye} m, {'flying' if self.walker.flying else 'walking'}"),
-                ("view", self.shown.view),
+                *(("leaning", f"{name}, {off:.0f}° off its views") for name, off in self._most_leaning),
+                ("view", f"{self.shown.view}{', every texel' * self.shown.dither}"),
             )
         return self._rows
+
+    @property
+    def leaning(self) -> dict[str, float]:
+        """Fans seen from far beside their views, and by how many degrees."""
+        return self.stage.leaning(self.camera, self.canvas.size)
+
+    @property
+    def _most_leaning(self) -> list[tuple[str, float]]:
+        return sorted(self.leaning.items(), key=lambda each: -each[1])[:1]
 
     @property
     def triangles_not_drawn(self) -> int:

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import sys
+import warnings
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import replace
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from impostor.cli import INTERRUPTED, AsJson, Force, Quiet, check_name, progress_bar
-from impostor.errors import GpuError, SettingsError
+from impostor.errors import GpuError, SettingsError, ViewWarning
 
 if TYPE_CHECKING:
     import moderngl
@@ -63,13 +64,13 @@ def walk(
     if record is not None and window:
         raise SettingsError("--window", "given with --record; expected one of them")
 
-    scene = ready_scene(scene_file)
+    scene = ready_scene(scene_file, quiet)
     path = scene.camera.path
     if record is not None and frames is None and path is None:
         raise SettingsError("--record", f"{scene_file} has no camera path; expected one in the scene, or --frames")
     shown = None if record is not None or window is False else _window(scene_file, pixels, not free_mouse, bool(window))
     if shown is not None:
-        summary = _walk_in_window(shown, scene_file, scene, frames, fps, picture, force)
+        summary = _walk_in_window(shown, scene_file, scene, frames, fps, picture, force, quiet)
     else:
         if frames is None:
             frames = 1 if path is None else math.floor(path.duration * fps + 1e-6) + 1
@@ -95,6 +96,7 @@ def render_scene(
     shadows: bool,
     camera: Mapping[str, Any],
     force: bool,
+    quiet: bool = False,
 ) -> None:
     """Draw what a scene's camera sees first, as a PNG.
 
@@ -102,12 +104,13 @@ def render_scene(
     """
     from impostor.files.pictures import save_png
     from runtime.gpu import make_context
+    from runtime.leaning import FARTHEST_OFF_DEG
     from runtime.walk import Walk
 
     if output not in OUTPUTS:
         raise SettingsError("--output", f"{output!r} of a scene; expected one of {', '.join(OUTPUTS)}")
     check_name(output_file, ".png", force)
-    scene = ready_scene(scene_file)
+    scene = ready_scene(scene_file, quiet)
     given = {name: tuple(value) if isinstance(value, list) else value for name, value in camera.items() if value}
     scene = replace(scene, camera=replace(scene.camera, **given))
     with ExitStack() as stack:
@@ -117,6 +120,10 @@ def render_scene(
         stack.callback(drawn.release)
         drawn.shown.view, drawn.shown.shadows = OUTPUTS[output], shadows
         drawn.draw()
+        for name, off in drawn.leaning.items():
+            found = f"{scene_file}: {name} is seen from an elevation {off:.3g} degrees away from its views"
+            expected = f"expected at most {FARTHEST_OFF_DEG:g}, a fan baked there, or lod = true"
+            warnings.warn(ViewWarning(f"{found}; {expected}"), stacklevel=1)
         save_png(output_file, drawn.picture(), force=force)
 
 
@@ -128,13 +135,13 @@ def picture_size(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
-def ready_scene(scene_file: Path) -> Scene:
+def ready_scene(scene_file: Path, quiet: bool = False) -> Scene:
     """A scene; what it is missing is baked."""
     from impostor.files.scene_file import load_scene
     from runtime.baking import Bakery, unbaked
 
     scene = load_scene(scene_file)
-    bakery = Bakery(unbaked(scene))
+    bakery = Bakery(unbaked(scene), quiet)
     try:
         bakery.poll(wait=True)
     except KeyboardInterrupt:
@@ -167,6 +174,7 @@ def _walk_in_window(
     fps: int,
     picture: Path | None,
     force: bool,
+    quiet: bool,
 ) -> dict[str, Any]:
     from impostor.files.pictures import save_png
     from impostor.files.scene_watcher import SceneWatcher
@@ -177,10 +185,10 @@ def _walk_in_window(
         stack.callback(window.close)
         samples, font_size = _samples(window.ctx), round(FONT_SIZE * window.pixel_ratio)
         window.announce(f"loading {scene_file.name} ...", font_size)
-        changes = SceneChanges(SceneWatcher(scene_file))
+        changes = SceneChanges(SceneWatcher(scene_file), quiet)
         walk = Walk(window.ctx, scene, window.picture_size, samples, changes, font_size)
         stack.callback(walk.release)
-        window.on_picture = lambda: walk.say(_written(scene_file, walk.picture()))
+        window.on_picture = lambda: walk.say(_written(scene_file, walk.picture(), quiet))
         if frames is None:
             window.run(walk)
         else:
@@ -191,7 +199,7 @@ def _walk_in_window(
         return _summary(walk)
 
 
-def _written(scene_file: Path, pixels: NDArray[np.uint8]) -> str:
+def _written(scene_file: Path, pixels: NDArray[np.uint8], quiet: bool) -> str:
     """Write a picture of a walk into the working directory; what to say of it."""
     from impostor.errors import OutputError
     from impostor.files.pictures import save_png
@@ -203,7 +211,8 @@ def _written(scene_file: Path, pixels: NDArray[np.uint8]) -> str:
         save_png(path, pixels)
     except OutputError as error:
         return str(error)
-    print(f"impostor: {path.resolve()} written", file=sys.stderr)
+    if not quiet:
+        print(f"impostor: {path.resolve()} written", file=sys.stderr)
     return f"{path} written"
 
 

@@ -152,11 +152,10 @@ def player(display, scene, tmp_path):
         )
         processes.append(process)
         player = Player(display, process)
-        with_help = player.see()
-        player.press("h")
-        without_help = player.until(lambda seen: (seen != with_help).any())
-        player.press("i")
-        player.until(lambda seen: (seen != without_help).any())
+        for key in "hhi":
+            before = player.see()
+            player.press(key)
+            player.until(lambda seen, before=before: (seen != before).any())
         time.sleep(0.3)
         return player
 
@@ -353,6 +352,25 @@ class TestWithoutWindow:
             err = capfd.readouterr().err
             assert err.count("\n") == messages and err.count("impostor: baking") == messages
         assert np.asarray(Image.open(tmp_path / "0.png")).max() > 60
+
+    @pytest.mark.parametrize("command", ["render", "walk"])
+    def test_quiet_says_nothing_of_a_bake(self, tmp_path, capfd, command):
+        write_obj(tmp_path / "cube.obj", CUBE, CUBE_FACES)
+        (tmp_path / "scene.toml").write_text(
+            "[camera]\neye = [0.5, 0.5, 4]\ntarget = [0.5, 0.5, 0]\n"
+            '[[instance]]\nmodel = "cube.obj"\nbake = { views = 2, size = 16 }\n'
+        )
+        flags = {"render": ("-o", tmp_path / "a.png"), "walk": ("--headless", "--frames", "1")}[command]
+        assert run(command, tmp_path / "scene.toml", "--size", "64x48", "--quiet", *flags) == 0
+        assert capfd.readouterr() == ("", "")
+
+    def test_a_fan_that_leans_is_warned_of_once(self, scene, tmp_path, capfd):
+        flags = ("-o", tmp_path / "a.png", "--size", "320x240", "--target", "2,0,0")
+        assert run("render", scene, *flags, "--eye", "2,1.7,6") == 0
+        assert capfd.readouterr().err == ""
+        assert run("render", scene, *flags, "--force", "--eye", "0,8,2") == 0
+        (line,) = capfd.readouterr().err.splitlines()
+        assert line.startswith("impostor: warning: ") and "degrees away from its views; expected at most 20" in line
 
     def test_a_model_that_cannot_be_baked_is_said_in_one_more_line(self, tmp_path, capfd):
         (tmp_path / "no.obj").write_text("no model")

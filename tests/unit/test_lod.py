@@ -16,6 +16,7 @@ from impostor.views import direction
 from runtime import LevelOfDetail
 from runtime.cameras import Camera
 from runtime.instances import Instances, Viewer
+from runtime.leaning import leaning
 from runtime.lod import FrameClock, Levels
 from runtime.offscreen import Offscreen
 from tests import gl as raw
@@ -136,6 +137,29 @@ class TestWantedLevel:
         copies.visible[:] = False
         renderer.draw(*filling(2.0))
         assert not screen.color().any()
+
+
+class TestLeaning:
+    """Copies that a mesh would be drawn in place of, were there one."""
+
+    def test_fans_are_named_of_which_half_of_the_copies_lean(self):
+        eye = 8 * direction(0, np.radians(40))
+        copies = [Instances(FAN, (0, 0, 0)), Instances(FAN, (0.1, 0, 0)), Instances(OTHER, (9, 0, 0))]
+        assert leaning(copies, viewer_at(eye)) == {"solids": pytest.approx(40, abs=1)}
+        level = Instances(FAN, np.tile((0, 5.1, 0), (3, 1)))
+        assert leaning([*copies, level], viewer_at(eye, (0, 2.5, 0), fov_deg=80)) == {}
+
+    @pytest.mark.parametrize(
+        ("eye", "size"),
+        [(8 * direction(0, np.radians(19)), 600), (8 * direction(0, np.radians(70)), 60), ((0, 30, -8), 600)],
+        ids=["near its views", "small", "behind"],
+    )
+    def test_what_does_not_show_is_not_named(self, eye, size):
+        target = (0, 0, 0) if eye[2] > 0 else (0, 30, -20)
+        assert leaning([Instances(FAN)], viewer_at(eye, target, size)) == {}
+
+    def test_no_copies_lean_nowhere(self):
+        assert leaning([Instances(FAN, np.zeros((0, 3)))], viewer_at((0, 9, 1))) == {}
 
 
 class TestHysteresis:

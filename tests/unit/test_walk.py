@@ -9,14 +9,15 @@ import pytest
 from impostor.files.fan_file import write_fan
 from impostor.files.scene_file import load_scene
 from impostor.files.scene_watcher import SceneWatcher
+from impostor.normal_code import BYTE_TO_NORMAL
 from runtime.draw_calls import counted_draw_calls
 from runtime.overlay import panel_picture
 from runtime.scene_changes import SceneChanges
-from runtime.walk import Walk
+from runtime.walk import HINT_SECONDS, Walk
 from runtime.walk_keys import HELD, KEYS, WINDOW
 from runtime.walker import MOVES, TURNS
 from tests.data import ROOT
-from tests.solids import RED, Box, solid_fan
+from tests.solids import RED, Box, Sphere, solid_fan
 
 TEXT = """
 ambient = 1.0
@@ -127,14 +128,45 @@ def test_the_path_leads_until_someone_walks(walk):
 
 def test_every_view_shows_something_of_its_own(walk):
     pictures = []
-    for view in ("lit", "albedo", "normals", "depth", "overdraw"):
+    for view in ("lit", "albedo", "normals", "depth", "overdraw", "codes"):
         walk.press(view)
         pictures.append(drawn(walk))
     grey = pictures[3]
     assert (grey.max(axis=-1) == grey.min(axis=-1)).all()
     assert grey[32, 32, 0] > grey[40, 2, 0] > 0 == grey[2, 2, 0]
-    for a, b in ((0, 2), (0, 3), (0, 4), (2, 3), (3, 4)):
+    for a, b in ((0, 2), (0, 3), (0, 4), (2, 3), (3, 4), (0, 5), (1, 5), (2, 5), (4, 5)):
         assert (pictures[a] != pictures[b]).any()
+
+
+def test_codes_are_those_of_the_fan_whatever_way_it_is_turned(walk, folder):
+    """Each texel is the colour of the one code that it has; what has none is dark."""
+    written(folder / "scene.toml", TEXT + "yaw_deg = 90\n")
+    walk.step(1.0)
+    walk.press("codes")
+    found = drawn(walk)
+    colors = np.unique(found[30:34, 31:33].reshape(-1, 3), axis=0)
+    palette = np.rint((BYTE_TO_NORMAL[:225] / 2 + 0.5) * 255)
+    for color in colors:
+        assert np.abs(palette - color).max(axis=1).min() <= 1
+    # The face toward the fan's own camera.
+    np.testing.assert_allclose(colors, [[128, 128, 255]], atol=16)
+    assert found[2, 2].max() < 40 and found[60, 4].max() < 120
+
+
+def test_the_dither_is_seen_where_texels_are_not_filtered(ctx, tmp_path):
+    write_fan(tmp_path / "box.fan", solid_fan(Sphere((0, 1, 0), 1, (200, 200, 200)), views=4, size=64))
+    (tmp_path / "scene.toml").write_text(TEXT.replace("ambient = 1.0", "ambient = 0.1"))
+    walk = Walk(ctx, load_scene(tmp_path / "scene.toml"), (256, 256))
+    try:
+        smooth = drawn(walk)
+        walk.press("dither")
+        texels = drawn(walk)
+        walk.press("dither")
+        np.testing.assert_array_equal(drawn(walk), smooth)
+    finally:
+        walk.release()
+    apart = [np.abs(np.diff(each[100:150, 110:150, 0], axis=1)).mean() for each in (smooth, texels)]
+    assert apart[1] > 1.1 * apart[0] > 0
 
 
 def test_distances_are_half_grey_at_seven_walking_heights(walk):
@@ -146,17 +178,32 @@ def test_distances_are_half_grey_at_seven_walking_heights(walk):
 def test_help_and_statistics_lie_over_the_picture_and_not_in_it(walk):
     plain = drawn(walk)
     assert (presented(walk) != plain).any()
-    walk.press("help")
     walk.press("statistics")
+    hint = (presented(walk) != plain).any(axis=-1)
+    # A line in the corner.
+    assert hint.any() and not hint[32:].any()
+    walk.press("help")
+    assert (presented(walk) != plain).any(axis=-1).sum() > 2 * hint.sum()
+    walk.press("help")
     np.testing.assert_array_equal(presented(walk), plain)
     walk.press("statistics")
     assert (presented(walk) != plain).any()
     np.testing.assert_array_equal(walk.picture(), plain)
 
 
-def test_the_divider_is_drawn_where_it_was_dragged(walk):
-    walk.press("help")
+def test_the_hint_goes_by_itself(walk):
     walk.press("statistics")
+    plain = drawn(walk)
+    for seconds in (1.0, 6.0):
+        walk.step(seconds)
+        assert (presented(walk) != plain).any()
+    walk.step(1.1)
+    np.testing.assert_array_equal(presented(walk), plain)
+
+
+def test_the_divider_is_drawn_where_it_was_dragged(walk):
+    walk.press("statistics")
+    walk.step(HINT_SECONDS)
     walk.press("split")
     walk.move_divider(-16)
     white = (presented(walk) == 255).all(axis=-1)[:10]
