@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -64,7 +65,7 @@ class Model:
     Attributes
     ----------
     name : str
-        The file's stem.
+        The file's stem, with a replacement character for what is no UTF-8 in it.
     primitives : tuple of Primitive
         One for each material; at least one.
     source_hash : str
@@ -187,7 +188,8 @@ def load_model(path: str | PathLike[str], *, up: str = "y", allow_missing_textur
         world[:3, :3] = axes
         for part in parts:
             part.worlds = [world @ matrix for matrix in part.worlds]
-        return _assembled(files.path, files.path.stem, parts, crease, source_hash=files.source_hash())
+        name = os.fsencode(files.path.stem).decode("utf-8", "replace")
+        return _assembled(files.path, name, parts, crease, source_hash=files.source_hash())
     except (ModelError, SettingsError):
         raise
     # Whatever third-party code trips over in a broken file is that file's fault to the user: one line, no traceback.
