@@ -1,10 +1,15 @@
 """The process behind the command `impostor`: Ctrl-C is one line from its first import on."""
 
+import io
 import sys
 
 
 def run() -> None:
     """The console script."""
+    # Names of files may hold what the terminal's encoding has not, and need not be text at all.
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     try:
         from impostor.cli import main
 

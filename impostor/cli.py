@@ -90,7 +90,7 @@ def _outcome(arguments: list[str]) -> tuple[int, list[str]]:
         sys.stderr.close()  # whoever read our output has gone
         return 1, []
     except OSError as error:
-        return 1, [f"{error.filename or 'system'}: {error.strerror or error}"]
+        return 1, [f"{error.filename or 'system'}: {error.strerror or error}; expected a file that can be used"]
 
 
 def make_app() -> typer.Typer:
@@ -275,6 +275,10 @@ def _held_warnings(notices: list[str]) -> Iterator[None]:
 def _usage_problem(error: typer.TyperException) -> str:
     """One line about flags and arguments, with the value that was given: Typer leaves it out."""
     message = " ".join(error.format_message().split())
+    if message.startswith("Missing ") and getattr(error, "param", None) is not None:
+        param = error.param  # type: ignore[attr-defined]
+        name = param.opts[0] if param.param_type_name == "option" else param.metavar
+        message = f"{name}: missing; expected one"
     if isinstance(error, typer.BadParameter) and error.param is not None and hasattr(error.__cause__, "errors"):
         problem: dict[str, Any] = error.__cause__.errors()[0]  # type: ignore[union-attr]
         expected = problem["msg"].removeprefix("Input should be ").partition(",")[0]

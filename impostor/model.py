@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -23,6 +24,8 @@ from impostor.paths import check_path
 __all__ = ["SUFFIXES", "Material", "Model", "Primitive", "load_model"]
 
 SUFFIXES = tuple(sorted((".glb", ".gltf", *CHECKS)))
+SMALLEST_SIZE = 1e-18
+"""Metres; squares of what is smaller vanish in 32 bits."""
 _UP = {
     "x": np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
     "y": np.eye(3),
@@ -65,7 +68,7 @@ class Model:
     Attributes
     ----------
     name : str
-        The file's stem.
+        The file's stem, with a replacement character for what is no UTF-8 in it.
     primitives : tuple of Primitive
         One for each material; at least one.
     source_hash : str
@@ -123,7 +126,7 @@ class Model:
         """
         normals, uvs, colors = (None if array is None else np.asarray(array) for array in (normals, uvs, colors))
         if material is not None and material.texture is not None and uvs is None:
-            raise ModelError(name, "material has a texture and uvs are None, expected uvs of shape (N, 2)")
+            raise ModelError(name, "material has a texture and uvs are None; expected uvs of shape (N, 2)")
         part = Part(
             "arrays",
             np.asarray(positions),
@@ -172,10 +175,10 @@ def load_model(path: str | PathLike[str], *, up: str = "y", allow_missing_textur
     """
     check_path(path)
     if up not in ("y", "z"):
-        raise SettingsError("up", f"'{up}', expected 'y' or 'z'")
+        raise SettingsError("up", f"'{up}'; expected 'y' or 'z'")
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES and not Path(path).is_dir():
-        raise ModelError(path, f"unknown extension '{suffix}', expected one of {', '.join(SUFFIXES)}")
+        raise ModelError(path, f"unknown extension '{suffix}'; expected one of {', '.join(SUFFIXES)}")
     try:
         files = ModelFiles(path)
         if suffix in (".glb", ".gltf"):
@@ -189,13 +192,14 @@ def load_model(path: str | PathLike[str], *, up: str = "y", allow_missing_textur
         world[:3, :3] = axes
         for part in parts:
             part.worlds = [world @ matrix for matrix in part.worlds]
-        return _assembled(files.path, files.path.stem, parts, crease, source_hash=files.source_hash())
+        name = os.fsencode(files.path.stem).decode("utf-8", "replace")
+        return _assembled(files.path, name, parts, crease, source_hash=files.source_hash())
     except (ModelError, SettingsError):
         raise
     # Whatever third-party code trips over in a broken file is that file's fault to the user: one line, no traceback.
     except Exception as error:
         raise ModelError(
-            path, f"cannot be read ({type(error).__name__}: {error}), expected a valid {suffix} file"
+            path, f"cannot be read ({type(error).__name__}: {error}); expected a valid {suffix} file"
         ) from error
 
 
@@ -210,7 +214,7 @@ def _assembled(where, name: str, parts: list[Part], crease: float, welded=True, 
     """Check and finish the parts, and join those of one material."""
     total = sum(len(part.triangles) * len(part.worlds) for part in parts)
     if total > MOST_TRIANGLES:
-        raise ModelError(where, f"{total} triangles with all instances, expected at most {MOST_TRIANGLES}")
+        raise ModelError(where, f"{total} triangles with all instances; expected at most {MOST_TRIANGLES}")
     by_material: dict[int, list[Part]] = {}
     with np.errstate(all="ignore"):
         distance = Distance([checked(where, part) for part in parts])
@@ -222,6 +226,8 @@ def _assembled(where, name: str, parts: list[Part], crease: float, welded=True, 
         found = f"{total} triangles, none of any area" if total else "no triangles"
         reason = f": {distance.problem}" if total and distance.problem else ""
         raise ModelError(where, f"{found}{reason}; expected at least one to draw")
+    if distance.size < SMALLEST_SIZE:
+        raise ModelError(where, f"{distance.size:.3g} m large; expected at least {SMALLEST_SIZE:g} m")
     if distance.problem:
         coarse = f"{distance.problem}, coarse for its size of {distance.size:.3g} m"
         warnings.warn(ModelWarning(f"{where}: {coarse}; expected it nearer to the origin"), stacklevel=3)

@@ -122,7 +122,7 @@ def decode(codes: ArrayLike) -> NDArray[np.float32]:
     """
     codes = np.asarray(codes)
     if codes.dtype != np.uint8:
-        raise SettingsError("codes", f"dtype is {codes.dtype}, expected uint8")
+        raise SettingsError("codes", f"dtype is {codes.dtype}; expected uint8")
     return BYTE_TO_NORMAL[codes]
 
 
@@ -224,12 +224,12 @@ def mip_codes(
     mask = coverage > 0 if mask is None else np.asarray(mask)
     normals, mask = _checked(normals, mask, ndim=4)
     if coverage.shape != mask.shape:
-        raise SettingsError("coverage", f"shape is {coverage.shape}, expected {mask.shape} as in normals")
+        raise SettingsError("coverage", f"shape is {coverage.shape}; expected {mask.shape} as in normals")
     if np.any((coverage > 0) & ~mask):
-        raise SettingsError("mask", "a texel with coverage is outside, expected every texel with coverage inside")
+        raise SettingsError("mask", "a texel with coverage is outside; expected every texel with coverage inside")
     most = 1 + int(max(*mask.shape[1:], 1) - 1).bit_length()
     if not 1 <= level_count <= most:
-        raise SettingsError("level_count", f"{level_count}, expected 1..{most} for {mask.shape[2]}x{mask.shape[1]}")
+        raise SettingsError("level_count", f"{level_count}; expected 1..{most} for {mask.shape[2]}x{mask.shape[1]}")
     levels = [dither(normals, mask)]
     weighted = np.where(mask[..., None], normals, 0) * coverage[..., None]
     for _ in range(1, level_count):
@@ -243,31 +243,31 @@ def _checked(normals: ArrayLike, mask: ArrayLike | None, ndim: int | None) -> tu
     normals = np.asarray(normals)
     shape = "(..., 3)" if ndim is None else "(V, H, W, 3)"
     if normals.ndim < 1 or normals.shape[-1] != 3 or ndim not in (None, normals.ndim):
-        raise SettingsError("normals", f"shape is {normals.shape}, expected {shape}")
+        raise SettingsError("normals", f"shape is {normals.shape}; expected {shape}")
     if not np.issubdtype(normals.dtype, np.floating):
-        raise SettingsError("normals", f"dtype is {normals.dtype}, expected a floating-point one")
+        raise SettingsError("normals", f"dtype is {normals.dtype}; expected a floating-point one")
     mask = np.ones(normals.shape[:-1], bool) if mask is None else np.asarray(mask)
     if mask.shape != normals.shape[:-1]:
-        raise SettingsError("mask", f"shape is {mask.shape}, expected {normals.shape[:-1]} as in normals")
+        raise SettingsError("mask", f"shape is {mask.shape}; expected {normals.shape[:-1]} as in normals")
     if mask.dtype != np.bool_:
-        raise SettingsError("mask", f"dtype is {mask.dtype}, expected bool")
+        raise SettingsError("mask", f"dtype is {mask.dtype}; expected bool")
     squared = np.einsum("...c,...c->...", normals, normals)
     low, high = (1 - UNIT_TOLERANCE) ** 2, (1 + UNIT_TOLERANCE) ** 2
     wrong = mask & ~((squared >= low) & (squared <= high))
     if wrong.any():
         place = tuple(int(k) for k in np.argwhere(wrong)[0])
         length = float(np.sqrt(squared[place]))
-        raise SettingsError("normals", f"length at {place} is {length:.4g}, expected 1 within {UNIT_TOLERANCE}")
+        raise SettingsError("normals", f"length at {place} is {length:.4g}; expected 1 within {UNIT_TOLERANCE}")
     return normals, mask
 
 
 def _checked_coverage(coverage: ArrayLike) -> NDArray[np.floating]:
     coverage = np.asarray(coverage)
     if not np.issubdtype(coverage.dtype, np.floating):
-        raise SettingsError("coverage", f"dtype is {coverage.dtype}, expected a floating-point one")
+        raise SettingsError("coverage", f"dtype is {coverage.dtype}; expected a floating-point one")
     wrong = ~((coverage >= 0) & (coverage <= 1))
     if wrong.any():
-        raise SettingsError("coverage", f"holds {float(coverage[wrong][0]):.4g}, expected 0..1")
+        raise SettingsError("coverage", f"holds {float(coverage[wrong][0]):.4g}; expected 0..1")
     return coverage
 
 

@@ -25,7 +25,7 @@ from impostor.cli import (
     progress_bar,
     refuse_with_fan,
 )
-from impostor.errors import ModelWarning, SettingsError
+from impostor.errors import ModelError, ModelWarning, SettingsError
 
 if TYPE_CHECKING:
     import moderngl
@@ -165,6 +165,7 @@ def compare(
     from runtime.compare import Comparison, side_by_side
     from runtime.compare import as_json as rows_as_json
     from runtime.light_settings import DEFAULT_LIGHTS
+    from runtime.lod import check_same_object
 
     _check_method(method)
     angles = _numbers("--offsets", offsets)
@@ -181,6 +182,10 @@ def compare(
     if fan.source.get("sha256") not in (None, model.source_hash):
         baked_from = f"{fan_file} was baked from another ({fan.source.get('name')})"
         warnings.warn(f"{model_file}: is not what the fan shows: {baked_from}", ModelWarning, stacklevel=1)
+    try:
+        check_same_object(fan, model)
+    except SettingsError as error:
+        raise ModelError(model_file, f"is not what {fan_file} shows: {error.problem}") from None
     with _context() as ctx, progress_bar("comparing", quiet) as progress:
         comparison = Comparison(ctx, fan, model, size, lights)
         try:

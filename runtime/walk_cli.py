@@ -58,7 +58,10 @@ def walk(
     if not 1 <= fps <= 240:
         raise SettingsError("--fps", f"{fps}; expected 1 to 240")
     if record is not None:
+        from impostor.files.video import film_size
+
         check_name(record, ".mp4", force)
+        pixels = film_size(pixels)
     if picture is not None:
         check_name(picture, ".png", force)
     if record is not None and window:

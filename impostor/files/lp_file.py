@@ -172,7 +172,7 @@ def _text(path: FilePath) -> str:
         with open(path, "rb") as file:
             data = file.read(LARGEST_FILE + 1)
     except OSError as error:
-        raise LpFileError(path, f"cannot be read: {error.strerror}") from error
+        raise LpFileError(path, f"cannot be read: {error.strerror}; expected a file that can") from error
     if len(data) > LARGEST_FILE:
         raise LpFileError(path, f"is larger than {LARGEST_FILE} bytes; expected lines of 'name x y z'")
     wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))

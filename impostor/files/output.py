@@ -49,7 +49,16 @@ def check_output(path: str | os.PathLike[str], force: bool = False) -> None:
     if not parent.is_dir():
         raise OutputError(path, f"directory {str(parent)!r} does not exist; expected one that does")
     if not os.access(parent, os.W_OK | os.X_OK):
-        raise OutputError(path, f"directory {str(parent)!r} cannot be written")
+        raise OutputError(path, f"directory {str(parent)!r} cannot be written; expected one that can")
+    # Not all that can be in the way shows in permissions: a name that is too long, a file system that takes no files.
+    temporary = _temporary(Path(os.path.realpath(final)))
+    try:
+        os.close(os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666))
+        temporary.unlink()
+    except FileExistsError:
+        pass  # litter, or another writer: the one who writes finds out
+    except OSError as error:
+        raise OutputError(path, f"cannot be written: {error.strerror}; expected a file that can") from error
 
 
 @contextmanager
@@ -75,14 +84,14 @@ def atomic_output(path: str | os.PathLike[str], force: bool = False) -> Iterator
     """
     check_output(path, force)
     final = Path(os.path.realpath(path))
-    temporary = final.with_name(f".impostor-{os.getpid()}.{final.name}")
+    temporary = _temporary(final)
     try:
         _remove_litter(final)
         descriptor = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
     except FileExistsError:
         raise OutputError(path, f"{temporary.name!r} is in the way; expected no other writer of this file") from None
     except OSError as error:
-        raise OutputError(path, f"cannot be written: {error.strerror}") from error
+        raise OutputError(path, f"cannot be written: {error.strerror}; expected a file that can") from error
     try:
         with open(descriptor, "r+b") as held:
             _lock(held.fileno())
@@ -97,6 +106,10 @@ def atomic_output(path: str | os.PathLike[str], force: bool = False) -> Iterator
         raise OutputError(path, f"cannot be written: {error.strerror}") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _temporary(final: Path) -> Path:
+    return final.with_name(f".impostor-{os.getpid()}.{final.name}")
 
 
 def _lock(descriptor: int) -> bool:

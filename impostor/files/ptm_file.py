@@ -154,7 +154,7 @@ def _file_bytes(path: FilePath) -> bytes:
             raise PtmFileError(path, "is a directory or no ordinary file" if Path(path).exists() else "does not exist")
         return Path(path).read_bytes()
     except OSError as error:
-        raise PtmFileError(path, f"cannot be read: {error.strerror}") from error
+        raise PtmFileError(path, f"cannot be read: {error.strerror}; expected a file that can") from error
 
 
 def _raw_body(

@@ -151,7 +151,7 @@ def _kind(path: FilePath) -> str:
         with open(path, "rb") as file:
             start = file.read(4)
     except OSError as error:
-        raise EnvironmentFileError(path, f"cannot be read: {error.strerror}") from error
+        raise EnvironmentFileError(path, f"cannot be read: {error.strerror}; expected a file that can") from error
     if not start:
         raise EnvironmentFileError(path, "is empty; expected a picture")
     kind = next((kind for kind, starts in KINDS.items() if start.startswith(starts)), None)

@@ -87,7 +87,7 @@ class Document:
                 data = file.read(LARGEST_FILE + 1)
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
-            raise SceneFileError(self.path, f"cannot be read: {reason}") from error
+            raise SceneFileError(self.path, f"cannot be read: {reason}; expected a file that can") from error
         if len(data) > LARGEST_FILE:
             raise SceneFileError(self.path, f"is larger than {LARGEST_FILE:,} bytes; expected a scene file")
         try:

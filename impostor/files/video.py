@@ -15,6 +15,11 @@ from impostor.files.output import atomic_output
 CODEC, QUALITY = "libx264", "18"  # constant rate factor: below it few people see a difference
 
 
+def film_size(size: tuple[int, int]) -> tuple[int, int]:
+    """Width and height of a video of pictures: even, as H.264's colours have no room for an odd column or row."""
+    return max(size[0] // 2 * 2, 2), max(size[1] // 2 * 2, 2)
+
+
 @contextmanager
 def video_output(
     path: str | os.PathLike[str], size: tuple[int, int], rate: int = 25, force: bool = False
@@ -26,7 +31,7 @@ def video_output(
     path : path-like
         Ends in `.mp4`.
     size : tuple of int
-        Width and height in pixels; an odd one loses its last column or row, which H.264's colours have no room for.
+        Width and height in pixels; where one is odd, pictures lose their last column or row, as `film_size` has it.
     rate : int
         Pictures a second.
     force : bool
@@ -45,7 +50,7 @@ def video_output(
     import av
     from av.error import FFmpegError
 
-    width, height = (max(side // 2 * 2, 2) for side in size)
+    width, height = film_size(size)
     with atomic_output(path, force) as temporary:
         try:
             with av.open(str(temporary), "w", format="mp4") as container:

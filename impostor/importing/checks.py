@@ -86,7 +86,7 @@ def _stl(files: ModelFiles) -> Prepared:
             raise ModelError(files.path, f"header: {count} triangles are {size} bytes, file holds {len(data)}")
     lower = data.lower()
     if b"endsolid" not in lower:
-        raise ModelError(files.path, "no 'endsolid', expected a whole ASCII or binary STL")
+        raise ModelError(files.path, "no 'endsolid'; expected a whole ASCII or binary STL")
     return Prepared(utf8(data), triangles=lower.count(b"endfacet"))
 
 
@@ -94,12 +94,12 @@ def _off(files: ModelFiles) -> Prepared:
     text = re.sub(rb"#[^\n]*", b"", utf8(files.data))
     match = re.match(rb"\s*((?:ST)?C?N?4?n?)OFF\b(.*)", text, re.DOTALL)
     if match is None or b"4" in match[1] or b"n" in match[1]:
-        raise ModelError(files.path, f"begins with {files.data[:12]!r}, expected OFF")
+        raise ModelError(files.path, f"begins with {files.data[:12]!r}; expected OFF")
     lines = [line for line in match[2].splitlines() if line.strip()]
     try:
         vertices, faces = (int(word) for word in lines[0].split()[:2])
     except (IndexError, ValueError) as error:
-        raise ModelError(files.path, "no line of counts, expected 'vertices faces edges'") from error
+        raise ModelError(files.path, "no line of counts; expected 'vertices faces edges'") from error
     if vertices < 0 or faces < 0 or len(lines) - 1 < vertices + faces:
         held = f"file holds {len(lines) - 1} lines"
         raise ModelError(files.path, f"counts: {vertices} vertices and {faces} faces, {held}: truncated")
@@ -111,14 +111,14 @@ def _off(files: ModelFiles) -> Prepared:
 
 def _obj(files: ModelFiles) -> Prepared:
     if b"\0" in files.data[:4096]:
-        raise ModelError(files.path, "holds binary data, expected an OBJ text")
+        raise ModelError(files.path, "holds binary data; expected an OBJ text")
     data = utf8(files.data)
     if _ODD_BLANKS.search(data):
         data = _ODD_BLANKS.sub(rb"\1\2 ", data)
     if short := re.search(rb"^f[ \t]+\S+(?:[ \t]+\S+)?[ \t]*\r?$", data, re.MULTILINE):
         raise ModelError(files.path, f"line {_line(data, short)}: '{_text(short)}' has fewer than 3 corners")
     if zero := re.search(rb"^f[^\n#]*[ \t/]0+(?:[/ \t\r\n]|\Z)[^\n]*", data, re.MULTILINE):
-        raise ModelError(files.path, f"line {_line(data, zero)}: '{_text(zero)}' has index 0, expected 1 and up")
+        raise ModelError(files.path, f"line {_line(data, zero)}: '{_text(zero)}' has index 0; expected 1 and up")
     if re.search(rb"^[lp][ \t]", data, re.MULTILINE):
         warn(files, "points and lines, not drawn")
     if re.search(rb"^f[^\n#]*[ \t/]-\d", data, re.MULTILINE):
@@ -164,7 +164,7 @@ def obj_index_problem(data: bytes) -> str | None:
         indices = [int(corner[column]) for corner in corners if corner[column]]
         wrong = next((index for index in indices if not 1 <= index <= held), None)
         if wrong is not None:
-            return f"a face uses {kind.decode()} {wrong}, expected 1..{held}"
+            return f"a face uses {kind.decode()} {wrong}; expected 1..{held}"
     return None
 
 
@@ -173,22 +173,22 @@ def _three_mf(files: ModelFiles) -> Prepared:
         with zipfile.ZipFile(io.BytesIO(files.data)) as archive:
             size = sum(entry.file_size for entry in archive.infolist())
             if size > _MOST_UNZIPPED:
-                raise ModelError(files.path, f"unpacks to {size} bytes, expected at most {_MOST_UNZIPPED}")
+                raise ModelError(files.path, f"unpacks to {size} bytes; expected at most {_MOST_UNZIPPED}")
             names = [name for name in archive.namelist() if "3d/3dmodel.model" in name.lower()]
             if not names:
-                raise ModelError(files.path, "no 3D/3dmodel.model inside, expected a 3MF package")
+                raise ModelError(files.path, "no 3D/3dmodel.model inside; expected a 3MF package")
             model = archive.read(names[0])
             other_models = [name for name in archive.namelist() if name.lower().endswith(".model") and name != names[0]]
             others = [archive.read(name) for name in other_models]
     except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, OSError, ValueError) as error:
-        raise ModelError(files.path, f"not a whole ZIP archive ({error}), expected a 3MF package") from error
+        raise ModelError(files.path, f"not a whole ZIP archive ({error}); expected a 3MF package") from error
     root = _xml(files, model)
     total = _check_3mf_instances(files, root, sum(other.count(b"triangle ") for other in others))
     if any(b"colorgroup" in part or b"basematerials" in part or b"texture2d" in part for part in (model, *others)):
         warn(files, "colours and textures of 3MF are not read, drawn grey")
     unit = root.get("unit", "millimeter")
     if unit not in _METRES:
-        raise ModelError(files.path, f"unit '{unit}', expected one of {', '.join(_METRES)}")
+        raise ModelError(files.path, f"unit '{unit}'; expected one of {', '.join(_METRES)}")
     return Prepared(files.data, _METRES[unit], "z", triangles=None if others else total)
 
 
@@ -203,7 +203,7 @@ def _check_3mf_instances(files: ModelFiles, root: etree._Element, elsewhere: int
     items = [item.get("objectid", "") for item in root.iter("{*}item")]
     for name in {*items, *(child for group in children.values() for child in group)} - set(own):
         if not elsewhere:
-            raise ModelError(files.path, f"object '{name}' is used but not there, expected one of {len(own)} objects")
+            raise ModelError(files.path, f"object '{name}' is used but not there; expected one of {len(own)} objects")
     return _check_instances(files, children, own, items)
 
 
@@ -214,7 +214,7 @@ def _check_instances(files: ModelFiles, children: dict, own: dict, roots: list) 
 
     def total(name) -> tuple[int, int]:
         if name in open_names:
-            raise ModelError(files.path, f"object '{name}' holds itself, expected no loops")
+            raise ModelError(files.path, f"object '{name}' holds itself; expected no loops")
         if name not in totals:
             open_names.add(name)
             below = [total(child) for child in children.get(name, ())]
@@ -233,17 +233,17 @@ def _check_instances(files: ModelFiles, children: dict, own: dict, roots: list) 
 def _dae(files: ModelFiles) -> Prepared:
     root = _xml(files, files.data)
     if etree.QName(root).localname != "COLLADA":
-        raise ModelError(files.path, f"root element is <{etree.QName(root).localname}>, expected <COLLADA>")
+        raise ModelError(files.path, f"root element is <{etree.QName(root).localname}>; expected <COLLADA>")
     if next(root.iter("{*}instance_controller"), None) is not None:
-        raise ModelError(files.path, "holds skinned meshes (instance_controller), expected meshes without skins")
+        raise ModelError(files.path, "holds skinned meshes (instance_controller); expected meshes without skins")
     if any(next(root.iter("{*}" + name), None) is not None for name in ("lines", "linestrips")):
         warn(files, "lines, not drawn")
     if root.find("{*}scene/{*}instance_visual_scene") is None:
-        raise ModelError(files.path, "no <scene> with an <instance_visual_scene>, expected one")
+        raise ModelError(files.path, "no <scene> with an <instance_visual_scene>; expected one")
     _check_dae_instances(files, root)
     unit, up = root.find("{*}asset/{*}unit"), root.findtext("{*}asset/{*}up_axis", "Y_UP").strip()
     if up not in ("X_UP", "Y_UP", "Z_UP"):
-        raise ModelError(files.path, f"up_axis '{up}', expected X_UP, Y_UP or Z_UP")
+        raise ModelError(files.path, f"up_axis '{up}'; expected X_UP, Y_UP or Z_UP")
     return Prepared(files.data, _dae_metres(files, unit), up[0].lower())
 
 
@@ -268,7 +268,7 @@ def _dae_metres(files: ModelFiles, unit: etree._Element | None) -> float:
     except ValueError:
         metres = 0.0
     if not (np.isfinite(metres) and metres > 0):
-        raise ModelError(files.path, f"unit meter='{text}', expected a positive number")
+        raise ModelError(files.path, f"unit meter='{text}'; expected a positive number")
     return metres
 
 

@@ -186,7 +186,7 @@ class Gltf:
         self._binary: bytes | None = None
         json = self._json_chunk() if files.data.startswith(b"glTF") else files.data
         if files.suffix == ".glb" and json is files.data:
-            raise ModelError(files.path, f"begins with {files.data[:4]!r}, expected b'glTF'")
+            raise ModelError(files.path, f"begins with {files.data[:4]!r}; expected b'glTF'")
         self._refuse_other_versions(self._decode(json, _Header).asset)
         self.document = self._decode(json, Document)
         self._buffers: dict[int, bytes] = {}
@@ -198,7 +198,7 @@ class Gltf:
         """`kind[index]` of the document, or an error that names who asked for it."""
         items = getattr(self.document, kind)
         if index >= len(items):
-            raise self.fail(f"{user}: refers to {kind}[{index}], expected an index below {len(items)}")
+            raise self.fail(f"{user}: refers to {kind}[{index}]; expected an index below {len(items)}")
         return items[index]
 
     def view(self, index: int, user: str) -> bytes:
@@ -215,9 +215,9 @@ class Gltf:
         accessor = self.item("accessors", index, user)
         place = f"accessors[{index}]"
         if accessor.component_type not in _COMPONENTS or accessor.type not in _WIDTHS:
-            raise self.fail(f"{place}: {accessor.component_type} {accessor.type}, expected a type of glTF 2.0")
+            raise self.fail(f"{place}: {accessor.component_type} {accessor.type}; expected a type of glTF 2.0")
         if accessor.count > _MOST_ELEMENTS:
-            raise self.fail(f"{place}: {accessor.count} elements, expected at most {_MOST_ELEMENTS}")
+            raise self.fail(f"{place}: {accessor.count} elements; expected at most {_MOST_ELEMENTS}")
         dtype, width = np.dtype(_COMPONENTS[accessor.component_type]), _WIDTHS[accessor.type]
         if accessor.buffer_view is None:
             values = np.zeros((accessor.count, width), dtype)
@@ -248,7 +248,7 @@ class Gltf:
                 continue
             accessor = self.item("accessors", index, place)
             if len(arrays[name]) != accessor.count:
-                raise self.fail(f"{place}.{name}: Draco data holds {len(arrays[name])}, expected {accessor.count}")
+                raise self.fail(f"{place}.{name}: Draco data holds {len(arrays[name])}; expected {accessor.count}")
             if accessor.normalized:
                 arrays[name] = _normalised(arrays[name])
         return arrays
@@ -258,7 +258,7 @@ class Gltf:
         image = self.item("images", index, user)
         place = f"images[{index}] ('{image.name or (image.uri or '')[:60]}')"
         if image.mime_type == "image/ktx2":
-            raise self.fail(f"{place}: is a KTX2 texture, expected PNG, JPEG or WebP")
+            raise self.fail(f"{place}: is a KTX2 texture; expected PNG, JPEG or WebP")
         if image.buffer_view is not None:
             return self.view(image.buffer_view, place), place
         if image.uri is None:
@@ -269,10 +269,10 @@ class Gltf:
         """The JSON of a GLB; its BIN chunk is kept as buffer 0."""
         data = self.files.data
         if len(data) < 12:
-            raise self.fail(f"{len(data)} bytes, expected a GLB header of 12")
+            raise self.fail(f"{len(data)} bytes; expected a GLB header of 12")
         version, length = struct.unpack_from("<II", data, 4)
         if version != 2:
-            raise self.fail(f"glTF {version}.0 in a binary container, expected glTF 2.0")
+            raise self.fail(f"glTF {version}.0 in a binary container; expected glTF 2.0")
         if length > len(data):
             raise self.fail(f"header says {length} bytes, file holds {len(data)}: truncated")
         chunks, offset = [], 12
@@ -283,7 +283,7 @@ class Gltf:
             chunks.append((kind, data[offset + 8 : offset + 8 + size]))
             offset += 8 + size
         if not chunks or chunks[0][0] != _JSON_CHUNK:
-            raise self.fail("first chunk is not JSON, expected a JSON chunk")
+            raise self.fail("first chunk is not JSON; expected a JSON chunk")
         if len(chunks) > 1 and chunks[1][0] == _BIN_CHUNK:
             self._binary = chunks[1][1]
         return chunks[0][1]
@@ -296,9 +296,9 @@ class Gltf:
 
     def _refuse_other_versions(self, asset: _Asset) -> None:
         if not asset.version.startswith("2."):
-            raise self.fail(f"asset.version: glTF {asset.version}, expected glTF 2.0")
+            raise self.fail(f"asset.version: glTF {asset.version}; expected glTF 2.0")
         if asset.min_version != "2.0":
-            raise self.fail(f"asset.minVersion: needs glTF {asset.min_version}, expected glTF 2.0")
+            raise self.fail(f"asset.minVersion: needs glTF {asset.min_version}; expected glTF 2.0")
 
     def _buffer(self, index: int, user: str) -> bytes:
         buffer = self.item("buffers", index, user)
@@ -308,10 +308,10 @@ class Gltf:
             elif index == 0 and self._binary is not None:
                 self._buffers[index] = self._binary
             else:
-                raise self.fail(f"buffers[{index}]: has no uri and no BIN chunk, expected one")
+                raise self.fail(f"buffers[{index}]: has no uri and no BIN chunk; expected one")
         data = self._buffers[index]
         if len(data) < buffer.byte_length:
-            raise self.fail(f"buffers[{index}]: holds {len(data)} bytes, expected {buffer.byte_length}")
+            raise self.fail(f"buffers[{index}]: holds {len(data)} bytes; expected {buffer.byte_length}")
         return data
 
     def _elements(
@@ -326,14 +326,14 @@ class Gltf:
 
     def _with_sparse(self, values: np.ndarray, sparse: _Sparse, place: str) -> np.ndarray:
         if sparse.indices.component_type not in (5121, 5123, 5125):
-            raise self.fail(f"{place}: sparse indices of type {sparse.indices.component_type}, expected unsigned")
+            raise self.fail(f"{place}: sparse indices of type {sparse.indices.component_type}; expected unsigned")
         dtype = np.dtype(_COMPONENTS[sparse.indices.component_type])
         data = self.view(sparse.indices.buffer_view, place)
         indices = self._elements(data, dtype, (sparse.count, 1), sparse.indices.byte_offset, None, place)[:, 0]
         data, shape = self.view(sparse.values.buffer_view, place), (sparse.count, values.shape[1])
         replacements = self._elements(data, values.dtype, shape, sparse.values.byte_offset, None, place)
         if sparse.count and indices.max() >= len(values):
-            raise self.fail(f"{place}: sparse index {indices.max()}, expected below {len(values)}")
+            raise self.fail(f"{place}: sparse index {indices.max()}; expected below {len(values)}")
         values = values.copy()
         values[indices] = replacements
         return values

@@ -109,7 +109,7 @@ class GltfMaterials:
 
     def _read_surface(self, source: GltfMaterial, place: str) -> _Surface:
         if source.alpha_mode not in ("OPAQUE", "MASK", "BLEND"):
-            raise self._gltf.fail(f"{place}: alphaMode '{source.alpha_mode}', expected OPAQUE, MASK or BLEND")
+            raise self._gltf.fail(f"{place}: alphaMode '{source.alpha_mode}'; expected OPAQUE, MASK or BLEND")
         pbr = source.pbr_metallic_roughness
         factor, info = pbr.base_color_factor, pbr.base_color_texture
         if "KHR_materials_pbrSpecularGlossiness" in source.extensions:
@@ -158,7 +158,7 @@ class GltfMaterials:
         if source is None:
             names = ", ".join(texture.extensions) or "no source"
             raise self._gltf.fail(
-                f"{place}: textures[{info.index}] has only {names}, expected a PNG, JPEG or WebP image"
+                f"{place}: textures[{info.index}] has only {names}; expected a PNG, JPEG or WebP image"
             )
         wraps = 0, 0
         if texture.sampler is not None:

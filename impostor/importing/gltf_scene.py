@@ -93,21 +93,21 @@ class _SceneReader:
         self.materials.tell_what_is_not_drawn()
         if not shown:
             raise self.gltf.fail(
-                f"the scene shows none of its {len(self.document.meshes)} meshes, expected at least one"
+                f"the scene shows none of its {len(self.document.meshes)} meshes; expected at least one"
             )
         return parts
 
     def _check_total(self, total: int) -> None:
         if total > MOST_TRIANGLES:
-            raise self.gltf.fail(f"{total} triangles and more with all instances, expected at most {MOST_TRIANGLES}")
+            raise self.gltf.fail(f"{total} triangles and more with all instances; expected at most {MOST_TRIANGLES}")
 
     def _check_extensions(self) -> None:
         used = {*self.document.extensions_used, *self.document.extensions_required}
         for name in sorted(used & _GEOMETRY_EXTENSIONS):
-            raise self.gltf.fail(f"extensionsUsed: {name} is not read, expected geometry without it")
+            raise self.gltf.fail(f"extensionsUsed: {name} is not read; expected geometry without it")
         known = _READ_EXTENSIONS | _HARMLESS_EXTENSIONS | _SEE_THROUGH_EXTENSIONS
         for name in sorted(set(self.document.extensions_required) - known):
-            raise self.gltf.fail(f"extensionsRequired: {name} is not known, expected a file that can do without it")
+            raise self.gltf.fail(f"extensionsRequired: {name} is not known; expected a file that can do without it")
         for index, material in enumerate(self.document.materials):
             for name in sorted(_SEE_THROUGH_EXTENSIONS & set(material.extensions)):
                 warn(self.gltf.files, f"materials[{index}] '{material.name}': {name} is not drawn, shown as opaque")
@@ -121,7 +121,7 @@ class _SceneReader:
             index, parent, user = stack.pop()
             node = self.gltf.item("nodes", index, user)
             if index in worlds:
-                raise self.gltf.fail(f"{user}: nodes[{index}] is in the scene twice, expected a tree without loops")
+                raise self.gltf.fail(f"{user}: nodes[{index}] is in the scene twice; expected a tree without loops")
             worlds[index] = parent @ _local(node)
             stack.extend((child, worlds[index], f"nodes[{index}]") for child in reversed(nodes[index].children))
         return worlds
@@ -132,7 +132,7 @@ class _SceneReader:
         children = {child for node in self.document.nodes for child in node.children}
         roots = [index for index in range(len(self.document.nodes)) if index not in children]
         if self.document.nodes and not roots:
-            raise self.gltf.fail("nodes: every node has a parent, expected a tree without loops")
+            raise self.gltf.fail("nodes: every node has a parent; expected a tree without loops")
         return roots
 
     def _part(
@@ -148,7 +148,7 @@ class _SceneReader:
 
         positions = attribute("POSITION")
         if positions is None:
-            raise self.gltf.fail(f"{place}: has no POSITION, expected one")
+            raise self.gltf.fail(f"{place}: has no POSITION; expected one")
         positions, normals = floats(positions), attribute("NORMAL")
         normals = None if normals is None else floats(normals)
         positions = self._morphed(positions, "POSITION", primitive, weights, place)
@@ -179,11 +179,11 @@ class _SceneReader:
         else:
             indices = self.gltf.accessor(primitive.indices, f"{place}.indices").reshape(-1)
         if indices.dtype.kind not in "iu":
-            raise self.gltf.fail(f"{place}: indices are {indices.dtype}, expected unsigned integers")
+            raise self.gltf.fail(f"{place}: indices are {indices.dtype}; expected unsigned integers")
         indices = indices.astype(np.int64)
         if primitive.mode == _TRIANGLES:
             if len(indices) % 3:
-                raise self.gltf.fail(f"{place}: {len(indices)} indices, expected a multiple of 3")
+                raise self.gltf.fail(f"{place}: {len(indices)} indices; expected a multiple of 3")
             return indices.reshape(-1, 3)
         if len(indices) < 3:
             return np.zeros((0, 3), np.int64)
@@ -200,7 +200,7 @@ class _SceneReader:
             if weight and name in target:
                 delta = floats(self.gltf.accessor(target[name], f"{place}.targets"))
                 if delta.shape != base.shape:
-                    raise self.gltf.fail(f"{place}: morph target has shape {delta.shape}, expected {base.shape}")
+                    raise self.gltf.fail(f"{place}: morph target has shape {delta.shape}; expected {base.shape}")
                 base = base + np.float32(weight) * delta
         return base
 
@@ -221,14 +221,14 @@ class _SceneReader:
                     f"{place}: JOINTS_{influence} and WEIGHTS_{influence} differ from POSITION in count"
                 )
             if len(joints) and joints.max() >= len(matrices):
-                raise self.gltf.fail(f"{place}: uses joint {joints.max()}, expected below {len(matrices)}")
+                raise self.gltf.fail(f"{place}: uses joint {joints.max()}; expected below {len(matrices)}")
             for column in range(4):
                 weight = weights[:, column].astype(np.float64)
                 blended += weight[:, None, None] * matrices[joints[:, column].astype(np.int64)]
                 total += weight
         weightless = total <= 0
         if weightless.any():
-            raise self.gltf.fail(f"{place}: vertex {np.argmax(weightless)} has no joint weight, expected a sum of 1")
+            raise self.gltf.fail(f"{place}: vertex {np.argmax(weightless)} has no joint weight; expected a sum of 1")
         blended /= total[:, None, None]
         moved = np.einsum("nij,nj->ni", blended[..., :3], positions) + blended[..., 3]
         if normals is not None:
@@ -239,13 +239,13 @@ class _SceneReader:
         """World from bind space for each joint, (J, 3, 4)."""
         missing = [joint for joint in skin.joints if joint not in self.worlds]
         if missing:
-            raise self.gltf.fail(f"{place}: joint nodes[{missing[0]}] is not in the scene, expected every joint there")
+            raise self.gltf.fail(f"{place}: joint nodes[{missing[0]}] is not in the scene; expected every joint there")
         worlds = np.stack([self.worlds[joint] for joint in skin.joints]) if skin.joints else np.zeros((0, 4, 4))
         if skin.inverse_bind_matrices is None:
             return worlds[:, :3]
         inverse_bind = self.gltf.accessor(skin.inverse_bind_matrices, place)
         if inverse_bind.shape[0] < len(worlds) or inverse_bind.shape[1] != 16:
-            raise self.gltf.fail(f"{place}: {len(inverse_bind)} inverse bind matrices, expected {len(worlds)}")
+            raise self.gltf.fail(f"{place}: {len(inverse_bind)} inverse bind matrices; expected {len(worlds)}")
         inverse_bind = inverse_bind[: len(worlds)].reshape(-1, 4, 4).transpose(0, 2, 1).astype(np.float64)
         return (worlds @ inverse_bind)[:, :3]
 

@@ -84,19 +84,19 @@ def decode_texture(files: ModelFiles, data: bytes, place: str) -> np.ndarray:
         For KTX2 and for what Pillow cannot decode whole.
     """
     if data.startswith(_KTX2_MAGIC):
-        raise ModelError(files.path, f"{place} is a KTX2 texture, expected PNG, JPEG or WebP")
+        raise ModelError(files.path, f"{place} is a KTX2 texture; expected PNG, JPEG or WebP")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             image = Image.open(io.BytesIO(data))
             if max(image.size) > LARGEST_TEXTURE:
                 width, height = image.size
-                raise ModelError(files.path, f"{place} is {width}x{height}, expected at most {LARGEST_TEXTURE} a side")
+                raise ModelError(files.path, f"{place} is {width}x{height}; expected at most {LARGEST_TEXTURE} a side")
             return pixels(image)
     except ModelError:
         raise
     except Exception as error:
-        raise ModelError(files.path, f"{place} cannot be decoded ({error}), expected an image") from error
+        raise ModelError(files.path, f"{place} cannot be decoded ({error}); expected an image") from error
 
 
 def pixels(image: Image.Image) -> np.ndarray:
@@ -208,7 +208,7 @@ def _mtl_numbers(files: ModelFiles, place: str, value: str) -> list[float]:
     except ValueError:
         numbers = []
     if not numbers or not np.isfinite(numbers).all():
-        raise ModelError(files.path, f"{place} is '{value}', expected one or three numbers")
+        raise ModelError(files.path, f"{place} is '{value}'; expected one or three numbers")
     return numbers
 
 

@@ -66,7 +66,7 @@ def imported_parts(files: ModelFiles, source: Prepared, loader: Callable, allow_
     parts = _Converter(files, materials).parts(loaded)
     found = sum(len(part.triangles) * len(part.worlds) for part in parts)
     if source.triangles is not None and found != source.triangles:
-        raise ModelError(files.path, f"{found} whole triangles, expected {source.triangles}")
+        raise ModelError(files.path, f"{found} whole triangles; expected {source.triangles}")
     for part in parts:
         if part.uvs is None and part.material.texture is not None:
             problem = obj_index_problem(source.data) if materials is not None else None

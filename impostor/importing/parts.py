@@ -59,15 +59,15 @@ def checked(where, part: Part) -> Part:
     part.triangles = np.asarray(part.triangles).astype(np.int64, copy=False)
     count = len(part.positions)
     if part.positions.ndim != 2 or part.positions.shape[1] != 3:
-        raise ModelError(where, f"{part.place}: positions have shape {part.positions.shape}, expected (N, 3)")
+        raise ModelError(where, f"{part.place}: positions have shape {part.positions.shape}; expected (N, 3)")
     if part.triangles.ndim != 2 or part.triangles.shape[1] != 3:
-        raise ModelError(where, f"{part.place}: triangles have shape {part.triangles.shape}, expected (M, 3)")
+        raise ModelError(where, f"{part.place}: triangles have shape {part.triangles.shape}; expected (M, 3)")
     for name, width in (("normals", 3), ("uvs", 2), ("colors", 4)):
         array = getattr(part, name)
         if array is not None and array.shape != (count, width):
-            raise ModelError(where, f"{part.place}: {name} have shape {array.shape}, expected {(count, width)}")
+            raise ModelError(where, f"{part.place}: {name} have shape {array.shape}; expected {(count, width)}")
     if part.colors is not None and part.colors.dtype != np.uint8:
-        raise ModelError(where, f"{part.place}: colors are {part.colors.dtype}, expected uint8")
+        raise ModelError(where, f"{part.place}: colors are {part.colors.dtype}; expected uint8")
     _check_indices(where, part, count)
     _check_finite(where, part)
     _drop_unused(part)
@@ -79,7 +79,7 @@ def _check_indices(where, part: Part, count: int) -> None:
     if outside.any():
         triangle, corner = np.argwhere(outside)[0]
         index = part.triangles[triangle, corner]
-        raise ModelError(where, f"{part.place}: triangle {triangle} uses vertex {index}, expected 0..{count - 1}")
+        raise ModelError(where, f"{part.place}: triangle {triangle} uses vertex {index}; expected 0..{count - 1}")
 
 
 def _check_finite(where, part: Part) -> None:
@@ -92,7 +92,7 @@ def _check_finite(where, part: Part) -> None:
         bad = np.flatnonzero(used & ~np.isfinite(array).all(axis=1))
         if len(bad):
             value = tuple(float(x) for x in array[bad[0]])
-            raise ModelError(where, f"{part.place}: {name} of vertex {bad[0]} are {value}, expected finite numbers")
+            raise ModelError(where, f"{part.place}: {name} of vertex {bad[0]} are {value}; expected finite numbers")
 
 
 def finished_part(where, part: Part, distance: Distance, crease: float, welded: bool = True) -> Part | None:

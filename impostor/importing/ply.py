@@ -55,12 +55,12 @@ def readable_ply(files: ModelFiles) -> bytes:
     """
     end = files.data.find(b"end_header")
     if not files.data.startswith(b"ply") or end < 0:
-        raise ModelError(files.path, "header: no 'ply' ... 'end_header', expected a PLY header")
+        raise ModelError(files.path, "header: no 'ply' ... 'end_header'; expected a PLY header")
     start = files.data.find(b"\n", end) + 1 or len(files.data)
     lines = [line.split() for line in files.data[:end].decode("ascii", "replace").splitlines()]
     style = next((line[1] for line in lines if line[:1] == ["format"] and len(line) > 1), "")
     if style not in ("ascii", "binary_little_endian", "binary_big_endian"):
-        raise ModelError(files.path, f"header: format '{style}', expected ascii or binary")
+        raise ModelError(files.path, f"header: format '{style}'; expected ascii or binary")
     elements = _elements(files, lines, ">" if style == "binary_big_endian" else "<")
     _check_claims(files, elements, style == "ascii", len(files.data) - start)
     if style == "ascii" or list(elements)[:2] != ["vertex", "face"]:
@@ -77,18 +77,18 @@ def _elements(files: ModelFiles, lines: list[list[str]], order: str) -> dict[str
         elif line[:1] == ["property"] and last is not None and len(line) == (5 if line[1] == "list" else 3):
             types = [np.dtype(order + _TYPES[word]) for word in line[1:-1] if word in _TYPES]
             if len(types) != len(line) - (3 if line[1] == "list" else 2):
-                raise ModelError(files.path, f"header: '{' '.join(line)}', expected types {', '.join(_TYPES)}")
+                raise ModelError(files.path, f"header: '{' '.join(line)}'; expected types {', '.join(_TYPES)}")
             last.properties.append(_Property(line[-1], types[-1], types[0] if line[1] == "list" else None))
         elif line[:1] in (["element"], ["property"]):
-            raise ModelError(files.path, f"header: '{' '.join(line)}', expected an element with a count, or a property")
+            raise ModelError(files.path, f"header: '{' '.join(line)}'; expected an element with a count, or a property")
     for name in ("vertex", "face"):
         if name not in elements:
-            raise ModelError(files.path, f"header: no element '{name}', expected a mesh of vertices and faces")
+            raise ModelError(files.path, f"header: no element '{name}'; expected a mesh of vertices and faces")
     missing = sorted({"x", "y", "z"} - {p.name for p in elements["vertex"].properties})
     if missing:
-        raise ModelError(files.path, f"header: vertices have no property '{missing[0]}', expected x, y and z")
+        raise ModelError(files.path, f"header: vertices have no property '{missing[0]}'; expected x, y and z")
     if not elements["face"].has_lists:
-        raise ModelError(files.path, "header: faces have no list, expected a list vertex_indices")
+        raise ModelError(files.path, "header: faces have no list; expected a list vertex_indices")
     return elements
 
 

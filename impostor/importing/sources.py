@@ -39,17 +39,17 @@ class ModelFiles:
 
     def _read_model(self) -> bytes:
         if not self.path.exists():
-            raise ModelError(self.path, "no such file, expected a model file")
+            raise ModelError(self.path, "no such file; expected a model file")
         if not self.path.is_file():
-            raise ModelError(self.path, "is a directory or a device, expected a model file")
+            raise ModelError(self.path, "is a directory or a device; expected a model file")
         try:
             data = self.path.read_bytes()
         except OSError as error:
-            raise ModelError(self.path, f"cannot be read ({error.strerror}), expected a readable file") from error
+            raise ModelError(self.path, f"cannot be read ({error.strerror}); expected a readable file") from error
         if not data:
-            raise ModelError(self.path, "0 bytes, expected a model")
+            raise ModelError(self.path, "0 bytes; expected a model")
         if data.startswith(b"version https://git-lfs"):
-            raise ModelError(self.path, "a Git LFS pointer, expected the model itself (run `git lfs pull`)")
+            raise ModelError(self.path, "a Git LFS pointer; expected the model itself (run `git lfs pull`)")
         return data
 
     def read(self, reference: str, place: str) -> bytes:
@@ -104,7 +104,7 @@ class ModelFiles:
         outside = relative.is_absolute() or ".." in relative.parts or "\0" in name
         if outside or _DRIVE.match(name.strip()) or _SCHEME.match(name.strip()):
             raise ModelError(
-                self.path, f"{place}: '{reference[:200]}' refused, expected a file in the model's own folder"
+                self.path, f"{place}: '{reference[:200]}' refused; expected a file in the model's own folder"
             )
         try:
             path = (self._folder / relative).resolve()

@@ -3,6 +3,7 @@
 import os
 import pty
 import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from impostor.files.fan_file import read_fan
 from tests.data import SAMPLES
 from tests.end_to_end.commands import (
     COMMAND,
+    CUBE,
+    CUBE_FACES,
     SMALL,
     SQUARE,
     SQUARE_FACES,
@@ -26,6 +29,8 @@ from tests.end_to_end.commands import (
 from tests.solids import Sphere
 
 BARE = ("--no-shadow", "--background", "transparent")
+ASCII = {"PYTHONIOENCODING": "ascii"}
+PLAIN = {"LC_ALL": "C", "LANG": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
 KNOT = SAMPLES / "knot.stl"
 
 
@@ -414,3 +419,23 @@ def test_a_bar_is_drawn_on_a_terminal_only(tmp_path, monkeypatch):
     assert on_a_terminal(*arguments, "--quiet") == ""
     piped = subprocess.run([COMMAND, *map(str, arguments)], capture_output=True, text=True, check=True)
     assert piped.stderr == ""
+
+
+class TestNames:
+    """File names are bytes; what is printed has the terminal's encoding, and what is stored is UTF-8."""
+
+    def test_a_name_that_the_terminal_cannot_show_is_printed_in_codes(self, tmp_path):
+        fan = baked(write_obj(tmp_path / "tree.obj", CUBE, CUBE_FACES), tmp_path / "\u6728.fan")
+        done = subprocess.run([COMMAND, "info", fan], capture_output=True, text=True, env=os.environ | ASCII)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert "\\u6728.fan" in done.stdout
+
+    @pytest.mark.skipif(sys.platform == "darwin", reason="its file systems take UTF-8 only")
+    @pytest.mark.parametrize(("raw", "stored"), [(b"b\xff", "b\ufffd"), ("\u6728".encode(), "\u6728")])
+    def test_a_name_that_is_no_text_bakes_and_is_told(self, tmp_path, raw, stored):
+        model, fan = (os.fsencode(tmp_path) + b"/" + raw + suffix for suffix in (b".obj", b".fan"))
+        write_obj(tmp_path / "cube.obj", CUBE, CUBE_FACES).rename(os.fsdecode(model))
+        command = [os.fsencode(COMMAND), b"bake", model, b"-o", fan, b"--views", b"2", b"--size", b"16"]
+        done = subprocess.run(command, capture_output=True, env=os.environ | PLAIN)
+        assert (done.returncode, done.stderr) == (0, b"")
+        assert read_fan(os.fsdecode(fan)).source["name"] == stored

@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from impostor.files.fan_file import write_fan
-from tests.end_to_end.commands import COMMAND, CUBE, CUBE_FACES, pixels, run, write_obj
+from tests.end_to_end.commands import COMMAND, CUBE, CUBE_FACES, json_of, pixels, run, write_obj
 from tests.solids import BLUE, RED, Box, solid_fan
 
 needs_xvfb = pytest.mark.skipif(shutil.which("Xvfb") is None, reason="no Xvfb, the display without a screen")
@@ -326,6 +326,12 @@ class TestWithoutWindow:
         assert blue[1] > blue[0]
         assert np.abs(pixels(last) - frames[-1]).mean() < 8
         assert capsys.readouterr() == ("", "")
+
+    def test_a_film_has_an_even_size_and_the_summary_says_it(self, scene, tmp_path, capsys):
+        film = tmp_path / "film.mp4"
+        flags = ("--size", "65x49", "--record", film, "--frames", 2)
+        assert json_of(capsys, "walk", scene, *flags, "--json")["size"] == [64, 48]
+        assert video_frames(film)[1][0].shape[:2] == (48, 64)
 
     def test_the_same_again_gives_the_same_picture(self, scene, tmp_path, capsys):
         for name in "ab":

@@ -39,6 +39,12 @@ def test_a_file_imports_only_from_below_and_stays_short(name):
     assert len(path.read_text().splitlines()) < MOST_LINES
 
 
+@pytest.mark.parametrize("name", sorted(FILES))
+def test_what_was_expected_follows_a_semicolon(name):
+    texts = [node.value for node in ast.walk(ast.parse(FILES[name].read_text())) if isinstance(node, ast.Constant)]
+    assert not [text for text in texts if isinstance(text, str) and ", expected " in text]
+
+
 def test_heavy_dependencies_have_one_way_in():
     (trimesh,) = importers("trimesh")
     assert trimesh == "impostor/model.py"

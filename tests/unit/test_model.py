@@ -82,11 +82,11 @@ def test_a_triangle_against_its_normals_is_turned():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"triangles": [[0, 1, 3]]}, "uses vertex 3, expected 0..2"),
+        ({"triangles": [[0, 1, 3]]}, "uses vertex 3; expected 0..2"),
         ({"positions": [[0, 0, 0], [1, np.nan, 0], [0, 1, 0]]}, "vertex 1 are (1.0, nan, 0.0)"),
         ({"triangles": [[0, 1, 1]]}, "none of any area"),
         ({"colors": [[0.5, 0.5, 0.5, 1.0]] * 3}, "expected uint8"),
-        ({"uvs": [[0, 0]]}, "uvs have shape (1, 2), expected (3, 2)"),
+        ({"uvs": [[0, 0]]}, "uvs have shape (1, 2); expected (3, 2)"),
         ({"material": Material(texture=np.zeros((1, 1, 4), np.uint8))}, "expected uvs"),
     ],
 )
@@ -451,7 +451,7 @@ def test_3mf_unit_axis_and_instances(tmp_path):
 def test_up_z_turns_z_to_y(tmp_path):
     (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 2 3\nf 1 2 3\n")
     np.testing.assert_allclose(load_model(tmp_path / "m.obj", up="z").bounds, [[0, 0, -2], [1, 3, 0]])
-    with pytest.raises(SettingsError, match="'x', expected 'y' or 'z'"):
+    with pytest.raises(SettingsError, match="'x'; expected 'y' or 'z'"):
         load_model(tmp_path / "m.obj", up="x")
 
 
