@@ -114,7 +114,8 @@ class ImpostorRenderer(LightSettings, FanSettings):
         fan, positions, yaws, scales, gloss, reflection
             As `Instances`.
         model : Model, optional
-            What the fan was baked from: copies near the camera are drawn as this mesh. Their shadows stay the fan's.
+            What the fan was baked from: copies near the camera are drawn as this mesh. Strips of the fan go on casting
+            their shadows, where the mesh would.
         level_of_detail : LevelOfDetail, optional
             Where near begins.
 
