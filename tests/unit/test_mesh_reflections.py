@@ -231,7 +231,7 @@ def test_a_reflection_may_be_changed_in_place(renderer, screen):
 def test_a_crossfade_leaves_the_fan_its_pixels(renderer, screen, rooms):
     renderer.rooms = rooms
     group = renderer.add_mesh(card(), reflection=Reflection())
-    copies = MeshCopies(group.buffers, Gloss(), np.eye(4)[None], np.array([0.25], np.float32), Reflection())
+    copies = MeshCopies(group.buffers, Gloss(), np.eye(4)[None], np.array([[0.25, 1.0]], np.float32), Reflection())
     with preserved_state(renderer._ctx) as state:
         viewer = Viewer.from_matrices(*filling(), state.viewport)
         renderer._update_lights("lit")
