@@ -14,7 +14,7 @@ from bake.capture import Capture
 from bake.resolve import CapturedView, TileLayers, dilate, resolve
 from bake.settings import RING_ELEVATION_DEG, camera_bases
 from impostor.checks import check_type
-from impostor.errors import SettingsError
+from impostor.errors import ModelError, SettingsError
 from impostor.fan import DEPTH_CODES, Fan
 from impostor.model import Model
 from impostor.normal_code import mip_codes
@@ -70,6 +70,8 @@ def bake_fan(
     ------
     SettingsError
         A number or a choice out of range, or views in which nothing of the object is seen.
+    ModelError
+        Nothing is seen of an object that is nowhere opaque.
     GpuError
         No OpenGL context.
 
@@ -147,6 +149,8 @@ class _Layers:
         """All of it, as a fan."""
         if not self._color[..., 3].any():
             found = "the object covers no texel of any view"
+            if all(part.material.alpha_mode != "OPAQUE" for part in model.primitives):
+                raise ModelError(model.name, f"{found}; expected a model whose alpha does not cut all of it out")
             raise SettingsError("size", f"{found}; expected larger tiles, or cameras that do not see it edge-on")
         silhouette: NDArray[np.bool_] = self._color[..., 3] >= 128
         source = {"name": model.name, "sha256": model.source_hash}

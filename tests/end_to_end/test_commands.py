@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from impostor.files.fan_file import read_fan
+from impostor.model import load_model
 from tests.data import SAMPLES
 from tests.end_to_end.commands import (
     COMMAND,
@@ -321,12 +322,21 @@ def test_more_views_are_nearer_to_the_mesh(knot, tmp_path, capsys):
     assert many["flip"] < few["flip"] and many["ssim"] > few["ssim"] and many["iou"] > few["iou"]
 
 
-def test_compare_warns_of_another_model(knot, sphere, capsys):
-    assert run("compare", knot, sphere[0], "--offsets", 0, "--cameras", 1) == 0
+def test_compare_warns_of_another_file(knot, tmp_path, capsys):
+    (part,) = load_model(KNOT).primitives
+    saved_again = write_obj(tmp_path / "knot.obj", part.positions, part.triangles)
+    assert run("compare", knot, saved_again, "--offsets", 0, "--cameras", 1) == 0
     out, err = capsys.readouterr()
     assert err.count("\n") == 1
-    assert "warning" in err and str(sphere[0]) in err and str(knot) in err
+    assert "warning" in err and str(saved_again) in err and str(knot) in err
     assert out.count("\n") == 2
+
+
+def test_compare_refuses_another_object(knot, sphere, capsys):
+    assert run("compare", knot, sphere[0], "--offsets", 0, "--cameras", 1) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith(f"impostor: {sphere[0]}: is not what {knot} shows: ") and err.count("\n") == 1
 
 
 def test_compare_where_there_is_nothing_to_see_is_still_json(tmp_path, capsys):

@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import distance_transform_edt
 
 from bake.fan import DILATION, FARTHEST, STEEPEST_PLANE, bake_fan
-from impostor.errors import SettingsError
+from impostor.errors import ModelError, SettingsError
 from impostor.model import Material, Model
 from impostor.normal_code import BYTE_TO_NORMAL
 from impostor.views import MAX_VIEWS
@@ -240,3 +240,9 @@ def test_numbers_out_of_range_are_refused(options, parameter):
 def test_an_object_that_no_view_sees_is_refused():
     with pytest.raises(SettingsError, match="no texel of any view"):
         bake_fan(square_about("x", np.pi / 2), views=4, elevation_deg=0, size=32)
+
+
+def test_an_object_whose_alpha_cuts_all_of_it_out_is_refused_as_that():
+    clear = Material(base_color=(1.0, 1.0, 1.0, 0.4), alpha_mode="MASK")
+    with pytest.raises(ModelError, match="no texel of any view; expected a model whose alpha does not cut all of it"):
+        bake_fan(Model.from_arrays(SQUARE, SQUARE_FACES, material=clear), views=2, size=16)
