@@ -79,8 +79,10 @@ def check_whole(where: str, value: object, low: int, high: int) -> int:
     SettingsError
         Another number, or something else.
     """
-    if isinstance(value, Integral) and not isinstance(value, bool) and low <= int(value) <= high:
-        return int(value)
+    if isinstance(value, Integral) and not isinstance(value, bool):
+        if low <= int(value) <= high:
+            return int(value)
+        raise SettingsError(where, f"{value}; expected {low} to {high}")
     found = value if isinstance(value, Real) else f"a {type(value).__name__}"
     raise SettingsError(where, f"{found}; expected a whole number from {low} to {high}")
 
