@@ -10,7 +10,7 @@ in vec3 back;                // world: the way along which the tile's depth coun
 in vec4 rectangle;           // the covered part of the tile: left, bottom, right, top in -1..1
 in vec3 place;               // x, y and side of the relit tile in the cache
 in vec4 depth;               // metres in front of the quad: at depth 0, from there to depth 1, and per unit of x and y
-in vec2 part;            // of the dither, from and to: which pixels are drawn
+in vec2 part;                // of the dither, from and to: which pixels are drawn
 out vec2 v_uv;
 out vec2 v_clip;
 flat out vec2 v_step;

@@ -114,6 +114,15 @@ def expected_mask(fan, place, matrices, light, plane):
     return mask
 
 
+def shadows_of_fan_and_mesh(renderer, ground, matrices, light):
+    """Where the same object casts its shadow as a fan, and where as a mesh."""
+    fan = renderer.add(FAN)
+    strip = shadowed(ground(matrices, [light]))
+    renderer.remove(fan)
+    renderer.add_mesh(solid_model(*SOLIDS))
+    return strip, shadowed(ground(matrices, [light]))
+
+
 class TestShape:
     @pytest.mark.parametrize("viewer", VIEWERS)
     @pytest.mark.parametrize("plane", [LEVEL, SLOPE], ids=["level", "slope"])
@@ -150,11 +159,7 @@ class TestShape:
         azimuth = view * 360 / 16
         matrices = filling(3.0, np.radians(azimuth + 67.5), np.radians(15), (0, 0.3, 0))
         light = light_at(azimuth, 15)
-        fan = renderer.add(FAN)
-        strip = shadowed(ground(matrices, [light]))
-        renderer.remove(fan)
-        renderer.add_mesh(solid_model(*SOLIDS))
-        mesh = shadowed(ground(matrices, [light]))
+        strip, mesh = shadows_of_fan_and_mesh(renderer, ground, matrices, light)
         assert mesh.sum() > 300
         assert iou(strip, mesh) > 0.9
 
@@ -168,11 +173,7 @@ class TestShape:
         """From near, from below and from above; the paper's steps 3 to 5 for the whole shadow come to 0.1 to 0.7."""
         eye = (0, 0.8, 0) + distance * direction(0.7, np.radians(elevation_deg))
         matrices = looking(eye, (0, 0.8, 0), fov_deg=np.degrees(2 * np.arctan(4 / distance)))
-        fan = renderer.add(FAN)
-        strip = shadowed(ground(matrices, [light]))
-        renderer.remove(fan)
-        renderer.add_mesh(solid_model(*SOLIDS))
-        mesh = shadowed(ground(matrices, [light]))
+        strip, mesh = shadows_of_fan_and_mesh(renderer, ground, matrices, light)
         assert mesh.sum() > 100
         assert iou(strip, mesh) > floor
 
