@@ -237,7 +237,7 @@ def above_feet(heights: ArrayLike, feet: float) -> NDArray[np.float64]:
     heights : array_like, (N,) float
         Metres.
     feet : float
-        Metres, `FEET` of the object's height.
+        Metres, `FEET` of the object's height; greater than 0.
     """
     part = np.clip(np.asarray(heights, float) / feet, 0, 1)
     return part * part * (3 - 2 * part)

@@ -64,9 +64,10 @@ class CastingFan:
 
     @property
     def feet(self) -> float:
-        """Metres of a copy of scale 1; see `shadow_projection.above_feet`."""
+        """Metres of a copy of scale 1, above 0; see `shadow_projection.above_feet`."""
         low, high = self.instances.fan.bounds[:, 1]
-        return FEET * float(high - low)
+        # What lies flat is all feet.
+        return max(FEET * float(high - low), 1e-6 * self.instances.fan.radius)
 
     def corners(self) -> NDArray[np.float64]:
         """World-space corners (N, 8, 3) of the copies' bounding boxes."""

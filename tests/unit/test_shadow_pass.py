@@ -17,6 +17,7 @@ from runtime.draw_calls import counted_draw_calls
 from runtime.grounds import GroundSurface
 from runtime.instances import Viewer, nearest_views, quads_toward
 from runtime.offscreen import Offscreen
+from runtime.shadow_strips import CastingFan
 from tests.pictures import apart, bluish, filling, greenish, iou, looking, placed
 from tests.solids import BLUE, GREEN, Box, Sphere, solid_fan, solid_model
 
@@ -176,6 +177,13 @@ class TestShape:
         strip, mesh = shadows_of_fan_and_mesh(renderer, ground, matrices, light)
         assert mesh.sum() > 100
         assert iou(strip, mesh) > floor
+
+    def test_an_object_of_no_height_is_all_feet(self, renderer, ground):
+        low, high = FAN.bounds
+        flat = replace(FAN, bounds=np.array([[*low[:1], 0, *low[2:]], [*high[:1], 0, *high[2:]]]))
+        renderer.add(flat)
+        assert CastingFan.of(Instances(flat), Viewer.from_matrices(*filling(), (0, 0, 64, 64)), LEVEL).feet > 0
+        assert shadowed(ground(VIEWERS["perspective"], [light_at(-50, 35)])).sum() > 100
 
     @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
     def test_a_copy_that_is_a_mesh_casts_where_its_mesh_does(self, renderer, ground, share):
