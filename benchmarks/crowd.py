@@ -20,10 +20,10 @@ from impostor.fan import Fan
 from impostor.lighting import DirectionalLight
 from impostor.model import load_model
 from impostor.shadow_projection import Ground
-from runtime.cameras import Camera
-from runtime.instances import Viewer
-from runtime.offscreen import Offscreen
+from runtime.gl.offscreen import Offscreen
 from runtime.renderer import ImpostorRenderer
+from runtime.viewing.cameras import Camera
+from runtime.viewing.viewer import Viewer
 
 NAMES = ("tree.glb", "pine.obj", "statue.glb", "house.glb", "truck.glb", "lattice.glb", "shell.ply", "knot.stl")
 COUNTS = (1, 100, 1000, 10_000, 100_000)

@@ -19,14 +19,14 @@ from impostor.fan import Fan
 from impostor.files.environment_file import read_environment
 from impostor.model import Model
 from impostor.views import ring_bases
-from runtime.cameras import Camera
 from runtime.compare import MESH_SAMPLES, Pair, between_cameras, errors
-from runtime.environments import RoomTable
-from runtime.fan_textures import FanTextures
-from runtime.lights import LightTable
-from runtime.offscreen import Offscreen
-from runtime.relight import PLACE_DTYPE, ROW_DTYPE, ColormapPass, Surroundings
+from runtime.fans.colormap_pass import PLACE_DTYPE, ROW_DTYPE, ColormapPass, Surroundings
+from runtime.fans.textures import FanTextures
+from runtime.gl.offscreen import Offscreen
+from runtime.lights.light_table import LightTable
 from runtime.renderer import ImpostorRenderer
+from runtime.rooms.environments import RoomTable
+from runtime.viewing.cameras import Camera
 
 PANORAMA = DATA / "env" / "royal_esplanade_1k.hdr"
 SURFACES = {

@@ -24,9 +24,9 @@ def main(fan_path: str, png_path: str) -> None:
     from impostor import Ground, load
     from impostor.files.pictures import save_png
     from runtime import ImpostorRenderer
-    from runtime.cameras import Camera
-    from runtime.gpu import make_context
-    from runtime.offscreen import Offscreen
+    from runtime.gl.context import make_context
+    from runtime.gl.offscreen import Offscreen
+    from runtime.viewing.cameras import Camera
 
     done("import")
     fan = load(fan_path)

@@ -18,14 +18,17 @@ from benchmarks.fresh_process import ROOT
 from benchmarks.tables import Bar, Row, Table
 from benchmarks.workbench import Workbench, say
 from impostor.scene import Placement, Scene
-from runtime import impostors, relighting, shadow_strips
-from runtime.baking import Bakery, unbaked
-from runtime.batch import Batch
-from runtime.instances import Instances, Quads, Viewer, nearest_views
-from runtime.lod import LevelOfDetail, Levels
-from runtime.view_fades import VIEW_FADE_SECONDS, ViewFades
-from runtime.walk import Walk
-from runtime.walk_cli import ready_scene
+from runtime.fans import impostor_pass, relighting
+from runtime.fans.batch import Batch
+from runtime.fans.lod import LevelOfDetail, Levels
+from runtime.instances.instances import Instances
+from runtime.instances.quads import Quads, nearest_views
+from runtime.instances.view_fades import VIEW_FADE_SECONDS, ViewFades
+from runtime.shadows import strips
+from runtime.stage.baking import Bakery, unbaked
+from runtime.viewing.viewer import Viewer
+from runtime.walk.cli import ready_scene
+from runtime.walk.walk import Walk
 
 SCENE = ROOT / "scenes" / "forest.toml"
 SIZE = 640, 352
@@ -176,7 +179,7 @@ class Flight:
             then = _with_view(instances, now, before.viewer.eye)
             switched = np.flatnonzero(now.view != then.view)
             found["views"] += len(switched)
-            levels = (impostors._levels(batch, *each) for each in ((then, before.viewer), (now, seen.viewer)))
+            levels = (impostor_pass._levels(batch, *each) for each in ((then, before.viewer), (now, seen.viewer)))
             found["tiles"] += int(np.count_nonzero(np.not_equal(*levels)))
             lit = (np.append(each.toward_light, 0.0) for each in (before, seen))
             cast = [nearest_views(instances, each, now.index) for each in lit]
@@ -196,7 +199,7 @@ def switches_held(before: Seen, now: Seen, kinds: Sequence[str]) -> Iterator[Non
     """Views, tiles' mip levels and shadows' views are chosen as for an earlier frame, and nothing known is relit."""
     eye = before.viewer.eye
     turned = np.append(np.subtract(before.toward_light, now.toward_light), 0.0)
-    levels_of, seen_by, quads_toward = impostors._levels, Batch.seen_by, shadow_strips.quads_toward
+    levels_of, seen_by, quads_toward = impostor_pass._levels, Batch.seen_by, strips.quads_toward
 
     def seen(batch: Batch, viewer: Viewer) -> Quads:
         quads, fades = seen_by(batch, viewer), batch.fades
@@ -215,10 +218,10 @@ def switches_held(before: Seen, now: Seen, kinds: Sequence[str]) -> Iterator[Non
         if "views" in kinds:
             hold(Batch, "seen_by", seen)
         if "shadows" in kinds:
-            hold(shadow_strips, "quads_toward", quads)
-            hold(shadow_strips, "nearest_views", lambda fan, toward, index: nearest_views(fan, toward + turned, index))
+            hold(strips, "quads_toward", quads)
+            hold(strips, "nearest_views", lambda fan, toward, index: nearest_views(fan, toward + turned, index))
         if "tiles" in kinds:
-            hold(impostors, "_levels", levels)
+            hold(impostor_pass, "_levels", levels)
         hold(relighting, "TEXELS_A_FRAME", 0)
         hold(relighting, "LARGEST_ERROR", 1e9)
         yield

@@ -12,8 +12,8 @@ from benchmarks.timing import alternate
 from benchmarks.workbench import Workbench
 from impostor.lighting import colormap
 from impostor.views import ring_bases
-from runtime.lights import LightTable
-from runtime.relight import ROW_DTYPE, ColormapPass
+from runtime.fans.colormap_pass import ROW_DTYPE, ColormapPass
+from runtime.lights.light_table import LightTable
 
 COUNTS = (1, 10, 100)
 

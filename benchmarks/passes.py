@@ -23,13 +23,14 @@ from benchmarks.tables import Row, Table
 from benchmarks.workbench import SAMPLES, Workbench, say
 from impostor.model import load_model
 from impostor.scene import Scene
-from runtime import batch, impostors, lod, relight, relighting, shadow_strips
-from runtime.canvas import Canvas
-from runtime.grounds import GroundPass
-from runtime.meshes import MeshPass
-from runtime.shadows import ShadowPass
-from runtime.walk import Walk
-from runtime.walk_cli import ready_scene
+from runtime.fans import batch, colormap_pass, impostor_pass, lod, relighting
+from runtime.gl.canvas import Canvas
+from runtime.ground.ground_pass import GroundPass
+from runtime.meshes.mesh_pass import MeshPass
+from runtime.shadows import strips
+from runtime.shadows.shadow_pass import ShadowPass
+from runtime.walk.cli import ready_scene
+from runtime.walk.walk import Walk
 
 FRAMES, WARM_UP = 24, 3
 START = 4.0  # seconds along the forest's path
@@ -37,12 +38,12 @@ COUNT = 10_000
 PARTS: dict[str, tuple[str, tuple[tuple[Any, str], ...]]] = {
     "levels": ("levels of detail: which copies are meshes", ((lod.Levels, "update"), (lod.Levels, "copies"))),
     "choice": ("selection and culling: which copies, which views", ((batch.Batch, "shown_to"),)),
-    "tiles": ("places of tiles, records, sorting, upload", ((impostors.ImpostorPass, "_arrange"),)),
-    "colormaps": ("colormaps", ((relight.ColormapPass, "write"),)),
+    "tiles": ("places of tiles, records, sorting, upload", ((impostor_pass.ImpostorPass, "_arrange"),)),
+    "colormaps": ("colormaps", ((colormap_pass.ColormapPass, "write"),)),
     "relight": ("tiles through their colormaps", ((relighting.Relighter, "relight"),)),
-    "quads": ("impostor quads", ((impostors._Drawing, "render"),)),
+    "quads": ("impostor quads", ((impostor_pass._Drawing, "render"),)),
     "meshes": ("meshes", ((MeshPass, "draw_copies"),)),
-    "casters": ("shadows: which copies cast", ((shadow_strips.CastingFan, "of"),)),
+    "casters": ("shadows: which copies cast", ((strips.CastingFan, "of"),)),
     "marks": ("shadows: marks of strips", ((ShadowPass, "_mark"),)),
     "darken": ("shadows: darkening the ground", ((ShadowPass, "_darken_ground"),)),
     "ground": ("ground", ((GroundPass, "draw"),)),

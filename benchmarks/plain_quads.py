@@ -5,10 +5,10 @@ from __future__ import annotations
 import moderngl
 
 from benchmarks.scenes import BACKGROUND, Field
-from runtime.gpu import set_uniforms
-from runtime.impostors import ALPHA_CUTOFF
-from runtime.quad_records import QUAD_DTYPE
-from runtime.relight import CORNERS
+from runtime.fans.impostor_pass import ALPHA_CUTOFF
+from runtime.fans.quad_records import QUAD_DTYPE
+from runtime.gl.programs import set_uniforms
+from runtime.gl.uploads import CORNERS
 
 VERTEX = """
 #version 330

@@ -9,7 +9,7 @@ from benchmarks.tables import Bar, Row, Table
 from benchmarks.workbench import Workbench, say
 from impostor.fan import Fan
 from runtime.compare import Comparison
-from runtime.light_settings import DEFAULT_AMBIENT, DEFAULT_LIGHTS
+from runtime.lights.settings import DEFAULT_AMBIENT, DEFAULT_LIGHTS
 
 OFFSETS_DEG = (0, 5, 10, 20, 35)
 CAMERAS = 8

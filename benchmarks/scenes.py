@@ -13,10 +13,10 @@ from impostor.lighting import DirectionalLight
 from impostor.model import Model
 from impostor.shadow_projection import Ground
 from impostor.views import basis_facing, direction, rotation_about_y
-from runtime.cameras import Camera
-from runtime.instances import Viewer
-from runtime.offscreen import Offscreen
+from runtime.gl.offscreen import Offscreen
 from runtime.renderer import ImpostorRenderer
+from runtime.viewing.cameras import Camera
+from runtime.viewing.viewer import Viewer
 
 WIDTH, HEIGHT = 1280, 720
 ELEVATION_DEG = 15.0

@@ -16,14 +16,14 @@ from benchmarks.workbench import Workbench, say
 from impostor.lighting import DirectionalLight, Gloss, LocalLight
 from impostor.model import Model
 from impostor.ptm.quantise import Ptm
-from runtime.cameras import Camera
-from runtime.gl_state import preserved_state
-from runtime.gpu import set_uniforms
-from runtime.instances import Viewer
-from runtime.offscreen import Offscreen
-from runtime.relit_surfaces import PATIENCE
-from runtime.surface_buffers import Light, SurfaceBuffers
-from runtime.surfaces import Surface, SurfacePass, rectangle
+from runtime.gl.offscreen import Offscreen
+from runtime.gl.programs import set_uniforms
+from runtime.gl.state import preserved_state
+from runtime.surfaces.buffers import Light, SurfaceBuffers
+from runtime.surfaces.relit_pictures import PATIENCE
+from runtime.surfaces.surface_pass import Surface, SurfacePass, rectangle
+from runtime.viewing.cameras import Camera
+from runtime.viewing.viewer import Viewer
 
 SIDE = 2048
 MOST = 2.0

@@ -14,7 +14,7 @@ from benchmarks.fresh_process import ROOT, Cost, run_fresh
 from impostor.fan import Fan
 from impostor.files.fan_file import read_fan
 from impostor.model import Model, load_model
-from runtime.gpu import make_context
+from runtime.gl.context import make_context
 
 DATA = Path(os.environ.get("IMPOSTOR_DATA") or ROOT.parent / "shared" / "data")
 SAMPLES = ROOT / "sample_models"

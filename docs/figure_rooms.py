@@ -12,12 +12,12 @@ from docs.studio import SAMPLES, Studio, captioned
 from impostor.environment import Environment, Reflection, Room
 from impostor.files.environment_file import read_environment
 from impostor.model import Material, Model
-from runtime.bump import Bump
-from runtime.cameras import Camera
-from runtime.offscreen import Offscreen
+from runtime.gl.offscreen import Offscreen
+from runtime.meshes.bump import Bump
 from runtime.renderer import ImpostorRenderer
-from runtime.walk import Walk
-from runtime.walk_cli import ready_scene
+from runtime.viewing.cameras import Camera
+from runtime.walk.cli import ready_scene
+from runtime.walk.walk import Walk
 
 STUDY_SIZE = (4.0, 3.0, 6.0)
 GOLD = Reflection(strength=1.0, least=0.9, metal=1.0)

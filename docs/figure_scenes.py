@@ -9,10 +9,10 @@ from PIL import Image
 from docs.studio import PAPER, Scene, Studio, captioned, grass, paving
 from impostor.lighting import DirectionalLight, Gloss
 from impostor.views import rotation_about_y
-from runtime.cameras import Camera
 from runtime.compare import Comparison, between_cameras, errors, side_by_side
-from runtime.grounds import GroundSurface
+from runtime.ground.ground_pass import GroundSurface
 from runtime.renderer import ImpostorRenderer
+from runtime.viewing.cameras import Camera
 
 # Sun or moon: azimuth and elevation in degrees, linear colour; linear ambient; sRGB of zenith and horizon.
 SKIES = (

@@ -23,11 +23,11 @@ from impostor.lighting import DirectionalLight
 from impostor.model import Model, load_model
 from impostor.shadow_projection import Ground
 from impostor.views import basis_facing, direction, frame
-from runtime.cameras import Camera
-from runtime.gpu import make_context
-from runtime.grounds import GroundSurface
-from runtime.offscreen import Offscreen
+from runtime.gl.context import make_context
+from runtime.gl.offscreen import Offscreen
+from runtime.ground.ground_pass import GroundSurface
 from runtime.renderer import ImpostorRenderer
+from runtime.viewing.cameras import Camera
 
 SAMPLES = Path(__file__).resolve().parents[1] / "sample_models"
 MODELS = {

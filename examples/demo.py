@@ -32,7 +32,7 @@ from impostor.files.output import atomic_output
 from impostor.files.pictures import save_png
 from impostor.summary import write_contact_sheet
 from runtime.compare import Comparison, between_cameras, errors, side_by_side
-from runtime.gpu import make_context
+from runtime.gl.context import make_context
 from runtime.pictures import PictureSettings, draw_picture, orbit_camera
 
 ROOT = Path(__file__).resolve().parents[1]

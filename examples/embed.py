@@ -10,7 +10,7 @@ from PIL import Image
 import impostor
 from bake.fan import bake_fan
 from runtime import ImpostorRenderer
-from runtime.gpu import make_context
+from runtime.gl.context import make_context
 
 TREE = Path(__file__).resolve().parents[1] / "sample_models" / "tree.glb"
 VERTEX = "#version 330\nuniform mat4 m; in vec2 p; void main() { gl_Position = m * vec4(p.x, 0.0, p.y, 1.0); }"

@@ -6,16 +6,17 @@ from impostor.lazy import lazy_names
 
 if TYPE_CHECKING:
     from runtime.animation import AnimatedFan, AnimatedInstances
-    from runtime.bump import Bump
-    from runtime.cameras import Camera
-    from runtime.contact_shadows import ContactShadows
-    from runtime.gpu import make_context
-    from runtime.grounds import GroundSurface
-    from runtime.instances import Instances
-    from runtime.lod import LevelOfDetail
+    from runtime.fans.lod import LevelOfDetail
+    from runtime.gl.context import make_context
+    from runtime.gl.offscreen import Offscreen
+    from runtime.ground.ground_pass import GroundSurface
+    from runtime.instances.instances import Instances
+    from runtime.lights.contact_settings import ContactShadows
+    from runtime.meshes.bump import Bump
     from runtime.renderer import ImpostorRenderer
-    from runtime.room_capture import capture_environment
-    from runtime.surfaces import Surface, lying_on, rectangle
+    from runtime.rooms.capture import capture_environment
+    from runtime.surfaces.surface_pass import Surface, lying_on, rectangle
+    from runtime.viewing.cameras import Camera
 
 __all__ = [
     "AnimatedFan",
@@ -27,6 +28,7 @@ __all__ = [
     "ImpostorRenderer",
     "Instances",
     "LevelOfDetail",
+    "Offscreen",
     "Surface",
     "capture_environment",
     "lying_on",
@@ -38,18 +40,19 @@ __getattr__ = lazy_names(
     __name__,
     {
         "AnimatedFan": "animation",
-        "Bump": "bump",
         "AnimatedInstances": "animation",
-        "ContactShadows": "contact_shadows",
-        "Camera": "cameras",
-        "GroundSurface": "grounds",
+        "Bump": "meshes.bump",
+        "Camera": "viewing.cameras",
+        "ContactShadows": "lights.contact_settings",
+        "GroundSurface": "ground.ground_pass",
         "ImpostorRenderer": "renderer",
-        "Instances": "instances",
-        "LevelOfDetail": "lod",
-        "capture_environment": "room_capture",
-        "Surface": "surfaces",
-        "lying_on": "surfaces",
-        "make_context": "gpu",
-        "rectangle": "surfaces",
+        "Instances": "instances.instances",
+        "LevelOfDetail": "fans.lod",
+        "Offscreen": "gl.offscreen",
+        "Surface": "surfaces.surface_pass",
+        "capture_environment": "rooms.capture",
+        "lying_on": "surfaces.surface_pass",
+        "make_context": "gl.context",
+        "rectangle": "surfaces.surface_pass",
     },
 )

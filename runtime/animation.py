@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,10 +13,7 @@ from impostor.errors import SettingsError
 from impostor.fan import Fan
 from impostor.lighting import Gloss
 from runtime.checks import check_type, numbers
-from runtime.instances import Instances
-
-if TYPE_CHECKING:
-    from runtime.renderer import ImpostorRenderer
+from runtime.instances.instances import Instances
 
 SMALLEST_SHARE = 1 / 256  # what the dither of a crossfade can still show
 
@@ -86,6 +83,16 @@ class AnimatedFan:
         return Poses(last, (last + 1) % count, share.astype(np.float32))
 
 
+class Renderer(Protocol):
+    """What copies are placed in: an `ImpostorRenderer`."""
+
+    def add(
+        self, fan: Fan, positions: ArrayLike, yaws: ArrayLike, scales: ArrayLike, gloss: Gloss | None
+    ) -> Instances: ...
+
+    def remove(self, placed: AnimatedInstances) -> None: ...
+
+
 class AnimatedInstances:
     """N moving copies, each at its own phase of one animation. Arrays may be written in place at any time.
 
@@ -125,7 +132,7 @@ class AnimatedInstances:
 
     def __init__(
         self,
-        renderer: ImpostorRenderer,
+        renderer: Renderer,
         animation: AnimatedFan,
         positions: ArrayLike = (0.0, 0.0, 0.0),
         yaws: ArrayLike = 0.0,

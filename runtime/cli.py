@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from impostor.fan import Fan
     from impostor.lighting import DirectionalLight, Gloss
     from impostor.model import Model
-    from runtime.cameras import Camera
+    from runtime.viewing.cameras import Camera
 
 METHODS = ("nearest",)
 MAX_SIDE = 16384
@@ -47,7 +47,7 @@ Method = Annotated[str, typer.Option(metavar="nearest", help="How views between 
 
 def register(app: typer.Typer) -> None:
     """Add this stage's commands."""
-    from runtime.walk_cli import walk
+    from runtime.walk.cli import walk
 
     app.command("render")(render)
     app.command("compare")(compare)
@@ -87,7 +87,7 @@ def render(
 ) -> None:
     """Draw a fan, a mesh through the same camera and lights, or what a scene's camera sees first, as a PNG."""
     if subject.suffix.lower() == ".toml":
-        from runtime.walk_cli import render_scene
+        from runtime.walk.cli import render_scene
 
         of_one_object = {"--light": light, "--ambient": ambient, "--gloss": gloss, "--background": background}
         of_one_object |= {"--environment": environment, "--reflection": reflection, "--exposure": exposure}
@@ -164,8 +164,8 @@ def compare(
     from impostor.model import load_model
     from runtime.compare import Comparison, side_by_side
     from runtime.compare import as_json as rows_as_json
-    from runtime.light_settings import DEFAULT_LIGHTS
-    from runtime.lod import check_same_object
+    from runtime.fans.lod import check_same_object
+    from runtime.lights.settings import DEFAULT_LIGHTS
 
     _check_method(method)
     angles = _numbers("--offsets", offsets)
@@ -207,7 +207,7 @@ def compare(
 @contextmanager
 def _context() -> Iterator[moderngl.Context]:
     """A context for one command."""
-    from runtime.gpu import make_context
+    from runtime.gl.context import make_context
 
     ctx = make_context()
     try:

@@ -16,11 +16,11 @@ from impostor.fan import Fan
 from impostor.lighting import DirectionalLight
 from impostor.model import Model
 from impostor.views import direction
-from runtime.cameras import FRAME_MARGIN, Camera
-from runtime.light_settings import DEFAULT_AMBIENT, DEFAULT_LIGHTS
-from runtime.offscreen import Offscreen
-from runtime.recentring import moved_camera, recentred
+from runtime.gl.offscreen import Offscreen
+from runtime.lights.settings import DEFAULT_AMBIENT, DEFAULT_LIGHTS
 from runtime.renderer import ImpostorRenderer
+from runtime.viewing.cameras import FRAME_MARGIN, Camera
+from runtime.viewing.recentring import moved_camera, recentred
 
 BACKGROUND = (0.4, 0.5, 0.6, 1.0)
 MESH_SAMPLES = 4

@@ -16,13 +16,13 @@ from impostor.fan import Fan
 from impostor.lighting import DirectionalLight, Gloss
 from impostor.model import Model
 from impostor.shadow_projection import Ground
-from runtime.cameras import Camera
-from runtime.grounds import GroundSurface
-from runtime.leaning import FARTHEST_OFF_DEG
-from runtime.light_settings import DEFAULT_AMBIENT, DEFAULT_LIGHTS
-from runtime.offscreen import Offscreen
-from runtime.recentring import moved_camera, moved_room, recentred
+from runtime.fans.leaning import FARTHEST_OFF_DEG
+from runtime.gl.offscreen import Offscreen
+from runtime.ground.ground_pass import GroundSurface
+from runtime.lights.settings import DEFAULT_AMBIENT, DEFAULT_LIGHTS
 from runtime.renderer import ImpostorRenderer
+from runtime.viewing.cameras import Camera
+from runtime.viewing.recentring import moved_camera, moved_room, recentred
 
 OUTPUTS = ("lit", "albedo", "normal", "depth", "alpha")
 MESH_SAMPLES = 4

@@ -6,13 +6,13 @@ import moderngl
 
 from impostor.fan import Fan
 from impostor.model import Model
-from runtime.batch import Batch
-from runtime.bump import Bump
-from runtime.fan_textures import FanTextures
-from runtime.gl_state import preserved_state
-from runtime.instances import Instances
-from runtime.lod import LevelOfDetail, Levels
-from runtime.meshes import MeshBuffers, MeshInstance
+from runtime.fans.batch import Batch
+from runtime.fans.lod import LevelOfDetail, Levels
+from runtime.fans.textures import FanTextures
+from runtime.gl.state import preserved_state
+from runtime.instances.instances import Instances
+from runtime.meshes.bump import Bump
+from runtime.meshes.mesh_pass import MeshBuffers, MeshInstance
 
 
 class Placed:

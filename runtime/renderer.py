@@ -18,24 +18,25 @@ from impostor.model import Model
 from impostor.ptm.quantise import Ptm
 from impostor.shadow_projection import Ground
 from runtime.animation import AnimatedInstances
-from runtime.bump import Bump
 from runtime.checks import check_type, check_whole, invertible, with_article
-from runtime.environments import RoomTable, check_rooms
-from runtime.fan_settings import FanSettings
-from runtime.gl_state import CallerState, preserved_state
-from runtime.grounds import GroundPass, GroundSurface
-from runtime.impostors import ImpostorPass
-from runtime.instances import Instances, Viewer
-from runtime.light_settings import LightSettings
-from runtime.lights import LightTable, check_lights
-from runtime.lod import FrameClock, LevelOfDetail, check_same_object
-from runtime.memory import memory_held
-from runtime.meshes import OUTPUTS, MeshInstance, MeshPass, check_meshes
+from runtime.fans.impostor_pass import ImpostorPass
+from runtime.fans.lod import FrameClock, LevelOfDetail, check_same_object
+from runtime.fans.settings import FanSettings
+from runtime.fans.tiles import TileCache
+from runtime.gl.memory import memory_held
+from runtime.gl.state import CallerState, preserved_state
+from runtime.ground.ground_pass import GroundPass, GroundSurface
+from runtime.instances.instances import Instances
+from runtime.lights.light_table import LightTable, check_lights
+from runtime.lights.settings import LightSettings
+from runtime.meshes.bump import Bump
+from runtime.meshes.mesh_pass import OUTPUTS, MeshInstance, MeshPass, check_meshes
 from runtime.placed import Placed
-from runtime.rooms import RoomPass, number_of, to_show
-from runtime.shadows import ShadowPass
-from runtime.surfaces import Surface, SurfacePass
-from runtime.tiles import TileCache
+from runtime.rooms.environments import RoomTable, check_rooms
+from runtime.rooms.room_pass import RoomPass, number_of, to_show
+from runtime.shadows.shadow_pass import ShadowPass
+from runtime.surfaces.surface_pass import Surface, SurfacePass
+from runtime.viewing.viewer import Viewer
 
 
 class ImpostorRenderer(LightSettings, FanSettings):
@@ -418,7 +419,7 @@ class ImpostorRenderer(LightSettings, FanSettings):
 
     @property
     def memory(self) -> dict[str, int]:
-        """Bytes that are held on the GPU, by kind; see `runtime.memory.memory_held`."""
+        """Bytes that are held on the GPU, by kind; see `runtime.gl.memory.memory_held`."""
         self._check_in_use()
         return memory_held(self)
 

@@ -3,8 +3,8 @@
 import pytest
 
 from runtime import ImpostorRenderer
-from runtime.gpu import make_context
-from runtime.offscreen import Offscreen
+from runtime.gl.context import make_context
+from runtime.gl.offscreen import Offscreen
 from tests import gl as raw
 from tests.gl import gl
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from impostor.views import rotation_about_y
-from runtime.cameras import Camera
+from runtime.viewing.cameras import Camera
 
 
 def filling(half=1.0, azimuth=0.0, elevation=0.0, center=(0.0, 0.0, 0.0)):

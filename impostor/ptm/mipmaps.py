@@ -13,7 +13,7 @@ from impostor.ptm.polynomials import Polynomials, basis
 def mip_maps(polynomials: Polynomials) -> list[Polynomials]:
     """A PTM in ever smaller sizes, each texel the mean of what it covers.
 
-    The best levels that there are. `runtime.surface_textures` makes others in a fifth of the time: the tests alone
+    The best levels that there are. `runtime.surfaces.textures` makes others in a fifth of the time: the tests alone
     make these, for what it costs to be quick.
 
     Parameters

@@ -18,7 +18,7 @@ from docs import choosing
 from impostor.lighting import DirectionalLight
 from impostor.model import load_model
 from runtime import Camera, GroundSurface, ImpostorRenderer
-from runtime.gpu import make_context
+from runtime.gl.context import make_context
 from tests.data import ROOT, SAMPLES
 from tests.pictures import apart, placed
 from tests.solids import BLUE, GREEN, Box, Sphere, solid_fan, solid_model

@@ -268,9 +268,9 @@ class TestWindow:
 
 STATE_IN_A_WINDOW = """
 from runtime import Camera, ImpostorRenderer
-from runtime.window import Window
+from runtime.walk.window import Window
 from impostor.shadow_projection import Ground
-from runtime.grounds import GroundSurface
+from runtime.ground.ground_pass import GroundSurface
 from tests.gl import snapshot
 from tests.solids import Box, solid_fan, solid_model
 

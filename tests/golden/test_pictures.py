@@ -12,8 +12,8 @@ from PIL import Image
 
 from impostor.lighting import DirectionalLight, Gloss
 from impostor.shadow_projection import Ground
-from runtime.grounds import GroundSurface
-from runtime.offscreen import Offscreen
+from runtime.gl.offscreen import Offscreen
+from runtime.ground.ground_pass import GroundSurface
 from tests.data import ROOT
 from tests.pictures import filling, looking, placed
 from tests.solids import GREY, Box, Sphere, solid_fan, solid_model

@@ -7,10 +7,11 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from runtime.batch import Batch
-from runtime.dither import WHOLE, divided, part_of, rest_of
-from runtime.instances import Instances, Viewer
-from runtime.lod import LevelOfDetail, Levels
+from runtime.fans.batch import Batch
+from runtime.fans.lod import LevelOfDetail, Levels
+from runtime.instances.dither import WHOLE, divided, part_of, rest_of
+from runtime.instances.instances import Instances
+from runtime.viewing.viewer import Viewer
 from tests.pictures import filling
 from tests.solids import Sphere, solid_fan
 

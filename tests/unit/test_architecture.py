@@ -7,15 +7,29 @@ from pathlib import Path
 
 import pytest
 
-from runtime import gpu
-from runtime.overdraw import OverdrawPass
-from runtime.overlay import Overlay
+from runtime.gl import programs
 from runtime.renderer import ImpostorRenderer
+from runtime.stage.overdraw import OverdrawPass
+from runtime.walk.overlay import Overlay
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("impostor", "bake", "runtime")
 FILES = {path.relative_to(ROOT).as_posix(): path for package in PACKAGES for path in ROOT.glob(f"{package}/**/*.py")}
 MOST_LINES = 450
+FLOORS = (
+    ("checks", "gl"),
+    ("viewing",),
+    ("instances", "rooms"),
+    ("lights",),
+    ("ground", "meshes"),
+    ("fans", "surfaces"),
+    ("placed", "shadows", "animation"),
+    ("renderer",),
+    ("pictures", "compare", "stage"),
+    ("walk",),
+    ("cli",),
+)
+"""Files and folders of the runtime, from the ground up: each imports from itself and from floors below."""
 MAY_IMPORT = {"impostor": {"impostor"}, "bake": {"bake", "impostor"}, "runtime": {"runtime", "impostor"}}
 
 
@@ -37,6 +51,27 @@ def test_a_file_imports_only_from_below_and_stays_short(name):
     path, package = FILES[name], name.split("/")[0]
     assert set(imports(path)) & set(PACKAGES) <= MAY_IMPORT[package]
     assert len(path.read_text().splitlines()) < MOST_LINES
+
+
+def test_the_runtime_stands_on_floors():
+    floors = {name: floor for floor, names in enumerate(FLOORS) for name in names}
+    homes = {path: path.relative_to(ROOT / "runtime").with_suffix("").parts[0] for path in runtime_files()}
+    assert set(floors) == set(homes.values())
+    for path, here in homes.items():
+        above = {name for name in runtime_imports(path) if name != here and floors[name] >= floors[here]}
+        assert not above, f"{path.name} imports from {', '.join(above)}"
+
+
+def runtime_files():
+    return [path for name, path in FILES.items() if name.startswith("runtime/") and path.name != "__init__.py"]
+
+
+def runtime_imports(path):
+    """Folders and files right in the runtime that a file imports from."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "runtime":
+            _, *names = node.module.split(".")
+            yield from names[:1] or [name.name for name in node.names]
 
 
 @pytest.mark.parametrize("name", sorted(FILES))
@@ -71,20 +106,20 @@ def test_every_package_and_every_data_file_is_shipped():
 def test_every_shader_of_the_runtime_is_compiled(ctx, monkeypatch):
     compiled = set()
 
-    def read(name, read=gpu._with_includes):
+    def read(name, read=programs._with_includes):
         compiled.add(name)
         return read(name)
 
-    monkeypatch.setattr(gpu, "_with_includes", read)
+    monkeypatch.setattr(programs, "_with_includes", read)
     for part in (ImpostorRenderer(ctx, cache_side=256), Overlay(ctx), OverdrawPass(ctx)):
         part.release()
-    assert compiled == {path.name for path in gpu.SHADERS.glob("*.*")}
+    assert compiled == {path.name for path in programs.SHADERS.glob("*.*")}
 
 
 def test_includes_do_not_include_and_all_are_used():
     included = set()
-    for path in gpu.SHADERS.glob("*.*"):
+    for path in programs.SHADERS.glob("*.*"):
         included |= set(re.findall(r'^#include "([^"]+)"$', path.read_text(), re.MULTILINE))
-    files = {path.name: path for path in (gpu.SHADERS / "include").iterdir()}
+    files = {path.name: path for path in (programs.SHADERS / "include").iterdir()}
     assert included == set(files)
     assert not any("#include" in path.read_text() for path in files.values())

@@ -5,8 +5,8 @@ import pytest
 
 from impostor.errors import SettingsError
 from impostor.views import direction
-from runtime.cameras import FRAME_MARGIN, Camera
-from runtime.instances import Viewer
+from runtime.viewing.cameras import FRAME_MARGIN, Camera
+from runtime.viewing.viewer import Viewer
 
 VIEWPORT = (0, 0, 200, 100)
 

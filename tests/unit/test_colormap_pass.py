@@ -9,12 +9,12 @@ from impostor.environment.colormap import environment_colormap, surface_points
 from impostor.lighting import DirectionalLight, Gloss, colormap
 from impostor.srgb import srgb_from_linear
 from impostor.views import basis_facing, direction, rotation_about_y
-from runtime.cameras import Camera
-from runtime.environments import RoomTable
-from runtime.fan_textures import FanTextures
-from runtime.gl_state import preserved_state
-from runtime.lights import LightTable
-from runtime.relight import PLACE_DTYPE, ROW_DTYPE, ColormapPass, Surroundings, tile_origins
+from runtime.fans.colormap_pass import PLACE_DTYPE, ROW_DTYPE, ColormapPass, Surroundings, tile_origins
+from runtime.fans.textures import FanTextures
+from runtime.gl.state import preserved_state
+from runtime.lights.light_table import LightTable
+from runtime.rooms.environments import RoomTable
+from runtime.viewing.cameras import Camera
 from tests.solids import BLUE, RED, Box, Sphere, solid_fan
 
 BASES = np.concatenate(

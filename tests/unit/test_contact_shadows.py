@@ -12,12 +12,12 @@ from impostor.lighting import DirectionalLight
 from impostor.shadow_projection import Ground
 from impostor.srgb import linear_from_srgb
 from impostor.views import direction
-from runtime import contact_shadows
-from runtime.contact_shadows import ContactShadows
-from runtime.draw_calls import counted_draw_calls
-from runtime.footprints import LIFTS, SIDE, fan_footprint, model_footprint
-from runtime.grounds import GroundSurface
-from runtime.offscreen import Offscreen
+from runtime.gl.draw_calls import counted_draw_calls
+from runtime.gl.offscreen import Offscreen
+from runtime.ground.ground_pass import GroundSurface
+from runtime.lights.contact_settings import ContactShadows
+from runtime.shadows import contact
+from runtime.shadows.footprints import LIFTS, SIDE, fan_footprint, model_footprint
 from tests import gl as raw
 from tests.pictures import filling, greenish, looking, placed
 from tests.solids import GREEN, Box, Sphere, solid_fan, solid_model
@@ -228,7 +228,7 @@ class TestCost:
         assert counted.count == 1  # the ground
 
     def test_a_tumbling_mesh_keeps_a_bounded_number_of_footprints(self, renderer, hidden, monkeypatch):
-        monkeypatch.setattr(contact_shadows, "MOST_FOOTPRINTS", 3)
+        monkeypatch.setattr(contact, "MOST_FOOTPRINTS", 3)
         mesh = renderer.add_mesh(solid_model(CUBE))
         for angle in np.linspace(0, 1.2, 8):
             cos, sin = np.cos(angle), np.sin(angle)
@@ -270,7 +270,7 @@ def test_nothing_to_stand_on_is_nothing(renderer, hidden):
 
 
 def test_more_ways_of_leaning_than_footprints_are_kept_are_all_drawn(renderer, hidden, monkeypatch):
-    monkeypatch.setattr(contact_shadows, "MOST_FOOTPRINTS", 2)
+    monkeypatch.setattr(contact, "MOST_FOOTPRINTS", 2)
     model = solid_model(CUBE)
     places = [(x, 0.0, z) for x in (-0.65, 0.0, 0.65) for z in (-0.5, 0.5)]
     for number, place in enumerate(places):

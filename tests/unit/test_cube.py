@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from impostor.environment import cube
-from runtime.gl_state import preserved_state
+from runtime.gl.state import preserved_state
 from tests.gl import SWITCHES, gl
 
 CORNERS = np.array(list(itertools.product((-1, 1), repeat=3)), float)

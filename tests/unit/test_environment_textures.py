@@ -9,9 +9,10 @@ from impostor.environment import Environment, Room
 from impostor.environment.blending import diffuse_weights, mirrored_room
 from impostor.environment.cube import sample
 from impostor.errors import GpuError, SettingsError
-from runtime import environments, gpu
-from runtime.environments import EnvironmentAtlas, RoomTable, check_rooms
-from runtime.gl_state import preserved_state
+from runtime.gl.programs import SHADERS
+from runtime.gl.state import preserved_state
+from runtime.rooms import environments
+from runtime.rooms.environments import EnvironmentAtlas, RoomTable, check_rooms
 
 RANDOM = np.random.default_rng(3)
 HALF = 2.0**-11  # largest relative error of a 16-bit number
@@ -51,9 +52,7 @@ def run(ctx, screen):
     def evaluated(body, rooms, a, b=(0, 0, 0, 0)):
         rows = np.stack(np.broadcast_arrays(np.atleast_2d(a), np.atleast_2d(b))).astype(np.float32)
         count = rows.shape[1]
-        source = re.sub(
-            r'#include "(.*)"', lambda match: (gpu.SHADERS / "include" / match[1]).read_text(), FRAGMENT % body
-        )
+        source = re.sub(r'#include "(.*)"', lambda match: (SHADERS / "include" / match[1]).read_text(), FRAGMENT % body)
         program = ctx.program(vertex_shader=VERTEX, fragment_shader=source)
         corners = ctx.buffer(np.array([-1, -1, 1, -1, -1, 1, 1, 1], np.float32))
         array = ctx.vertex_array(program, [(corners, "2f", "corner")])

@@ -8,9 +8,9 @@ from impostor.errors import ModelError, ModelWarning
 from impostor.model import Model, load_model
 from impostor.normal_code import decode
 from impostor.summary import _ranges
-from runtime.cameras import Camera
 from runtime.compare import Comparison
 from runtime.pictures import PictureSettings, draw_picture, orbit_camera
+from runtime.viewing.cameras import Camera
 from tests.data import SAMPLES
 from tests.end_to_end.commands import write_obj
 from tests.unit.gltf_builder import GltfBuilder

@@ -7,7 +7,7 @@ from benchmarks.flight import Flight, blocks, means
 from benchmarks.passes import PARTS, parts_timed
 from impostor.files.fan_file import write_fan
 from impostor.files.scene_file import load_scene
-from runtime.walk import Walk
+from runtime.walk.walk import Walk
 from tests.solids import RED, Box, solid_fan
 
 SCENE = """

@@ -10,12 +10,12 @@ from impostor.errors import SettingsError
 from impostor.lighting import DirectionalLight, Gloss, LocalLight
 from impostor.shadow_projection import Ground
 from runtime import ImpostorRenderer
-from runtime.bump import Bump
-from runtime.cameras import Camera
-from runtime.gpu import make_context
-from runtime.grounds import GroundSurface
-from runtime.offscreen import Offscreen
-from runtime.surfaces import rectangle
+from runtime.gl.context import make_context
+from runtime.gl.offscreen import Offscreen
+from runtime.ground.ground_pass import GroundSurface
+from runtime.meshes.bump import Bump
+from runtime.surfaces.surface_pass import rectangle
+from runtime.viewing.cameras import Camera
 from tests import gl as raw
 from tests.conftest import live_objects
 from tests.gl import gl

@@ -10,9 +10,9 @@ from scipy.ndimage import binary_erosion
 from impostor.lighting import DirectionalLight, Gloss
 from impostor.views import direction
 from runtime import ImpostorRenderer, LevelOfDetail
-from runtime.fan_textures import FanTextures
-from runtime.impostors import _ascending
-from runtime.offscreen import Offscreen
+from runtime.fans.impostor_pass import _ascending
+from runtime.fans.textures import FanTextures
+from runtime.gl.offscreen import Offscreen
 from tests.pictures import apart, bluish, cropped, filling, iou, looking, placed
 from tests.solids import BLUE, GREEN, RED, WHITE, Box, Sphere, card_fan, corner_card, solid_fan, solid_model
 

@@ -7,9 +7,10 @@ from impostor.errors import SettingsError
 from impostor.lighting import Gloss
 from impostor.views import direction, frame, layout_bases, rotation_about_y
 from runtime import Instances
-from runtime.cameras import Camera
-from runtime.instances import Viewer, nearest_views, quads_toward
-from runtime.placement import ViewVectors
+from runtime.instances.placement import ViewVectors
+from runtime.instances.quads import nearest_views, quads_toward
+from runtime.viewing.cameras import Camera
+from runtime.viewing.viewer import Viewer
 from tests.solids import Sphere, solid_fan
 
 FAN = solid_fan(Sphere((0.5, 0.2, 0.0)), views=8, size=16, elevation_deg=10, slopes=(0.1, 0.2, -0.3))

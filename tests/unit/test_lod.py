@@ -14,11 +14,12 @@ from impostor.model import load_model
 from impostor.shadow_projection import Ground
 from impostor.views import direction
 from runtime import LevelOfDetail
-from runtime.cameras import Camera
-from runtime.instances import Instances, Viewer
-from runtime.leaning import leaning
-from runtime.lod import FrameClock, Levels
-from runtime.offscreen import Offscreen
+from runtime.fans.leaning import leaning
+from runtime.fans.lod import FrameClock, Levels
+from runtime.gl.offscreen import Offscreen
+from runtime.instances.instances import Instances
+from runtime.viewing.cameras import Camera
+from runtime.viewing.viewer import Viewer
 from tests import gl as raw
 from tests.gl import gl
 from tests.pictures import apart, filling, looking

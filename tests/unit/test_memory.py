@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from impostor.shadow_projection import Ground
-from runtime.cameras import Camera
-from runtime.fan_textures import FanTextures
-from runtime.memory import memory_held
-from runtime.offscreen import Offscreen
+from runtime.fans.textures import FanTextures
+from runtime.gl.memory import memory_held
+from runtime.gl.offscreen import Offscreen
 from runtime.renderer import ImpostorRenderer
+from runtime.viewing.cameras import Camera
 from tests.solids import GREY, RED, Box, solid_fan, solid_model
 
 BOX = Box((-0.5, 0, -0.5), (0.5, 2, 0.5), RED)

@@ -10,7 +10,7 @@ from impostor.lighting import DirectionalLight, Gloss
 from impostor.model import Material, Model
 from impostor.srgb import srgb_from_linear
 from impostor.views import direction
-from runtime.offscreen import Offscreen
+from runtime.gl.offscreen import Offscreen
 from tests.pictures import apart, cropped, filling, looking, placed
 from tests.solids import BLUE, GREEN, RED, WHITE, Box, Sphere, corner_card, solid_model
 

@@ -11,11 +11,11 @@ from impostor.lighting import DirectionalLight, Gloss
 from impostor.model import Material, Model
 from impostor.srgb import linear_from_srgb, srgb_from_linear
 from impostor.views import rotation_about_y
-from runtime.bump import Bump
-from runtime.gl_state import preserved_state
-from runtime.instances import Viewer
-from runtime.lod import LevelOfDetail
-from runtime.meshes import MeshCopies
+from runtime.fans.lod import LevelOfDetail
+from runtime.gl.state import preserved_state
+from runtime.meshes.bump import Bump
+from runtime.meshes.mesh_pass import MeshCopies
+from runtime.viewing.viewer import Viewer
 from tests.pictures import filling, placed
 from tests.solids import Box, Sphere, solid_fan, solid_model
 

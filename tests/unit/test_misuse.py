@@ -8,7 +8,7 @@ from bake.fan import bake_fan
 from impostor.errors import ImpostorError, SettingsError
 from impostor.lighting import DirectionalLight, LocalLight
 from runtime import GroundSurface, ImpostorRenderer
-from runtime.cameras import Camera
+from runtime.viewing.cameras import Camera
 from tests.solids import Box, Sphere, solid_fan, solid_model
 
 FAN, MODEL = solid_fan(Sphere(), views=6, size=32), solid_model(Box((-0.5, 0, -0.5), (0.5, 1.5, 0.5)))
@@ -150,7 +150,7 @@ def test_an_impossible_cache_is_refused_when_it_is_asked_for(ctx, side):
 
 def test_the_largest_cache_fits(ctx):
     """The message's largest side is one that the GPU can hold."""
-    from runtime.tiles import TileCache
+    from runtime.fans.tiles import TileCache
 
     most = TileCache.largest(ctx)
     limit = ctx.info["GL_MAX_TEXTURE_SIZE"]

@@ -7,9 +7,9 @@ from PIL import Image
 from impostor.errors import GpuError, OutputError, SettingsError
 from impostor.files.pictures import save_png
 from impostor.shadow_projection import Ground
-from runtime.cameras import Camera
-from runtime.grounds import GroundSurface
-from runtime.offscreen import Offscreen
+from runtime.gl.offscreen import Offscreen
+from runtime.ground.ground_pass import GroundSurface
+from runtime.viewing.cameras import Camera
 
 LEVEL = Ground((0, 1, 0), 0.0)
 

@@ -8,8 +8,8 @@ from impostor.environment.colormap import environment_colormap
 from impostor.environment.cube import face_directions
 from impostor.lighting import DirectionalLight, colormap
 from impostor.views import basis_facing, direction
-from runtime.lights import REMEMBERED, LightTable
-from runtime.relighting import EXACT_ROWS, SHARED_TURN, distinct_turns
+from runtime.fans.relighting import EXACT_ROWS, SHARED_TURN, distinct_turns
+from runtime.lights.light_table import REMEMBERED, LightTable
 from tests.pictures import filling
 from tests.solids import Sphere, solid_fan
 
@@ -103,7 +103,7 @@ class TestSharedColormaps:
 class TestManyTiles:
     @pytest.fixture
     def few_texels(self, monkeypatch):
-        monkeypatch.setattr("runtime.relighting.TEXELS_A_FRAME", 4000)
+        monkeypatch.setattr("runtime.fans.relighting.TEXELS_A_FRAME", 4000)
 
     def drawn(self, renderer, screen, *lights):
         renderer.lights = lights

@@ -8,10 +8,10 @@ from impostor.lighting import DirectionalLight
 from impostor.shadow_projection import Ground
 from runtime import ImpostorRenderer
 from runtime.animation import AnimatedFan, AnimatedInstances
-from runtime.cameras import Camera
-from runtime.contact_shadows import ContactShadows
-from runtime.grounds import GroundSurface
-from runtime.surfaces import rectangle
+from runtime.ground.ground_pass import GroundSurface
+from runtime.lights.contact_settings import ContactShadows
+from runtime.surfaces.surface_pass import rectangle
+from runtime.viewing.cameras import Camera
 from tests.ptms import random_ptm
 from tests.solids import Box, Sphere, solid_fan, solid_model
 

@@ -9,9 +9,9 @@ from scipy.ndimage import maximum_filter, minimum_filter
 from impostor.environment import Environment, Room
 from impostor.errors import SettingsError
 from impostor.model import Material, Model
-from runtime.cameras import Camera
-from runtime.offscreen import Offscreen
-from runtime.room_capture import capture_environment
+from runtime.gl.offscreen import Offscreen
+from runtime.rooms.capture import capture_environment
+from runtime.viewing.cameras import Camera
 from tests.pictures import apart
 from tests.rooms import EMPTY
 from tests.solids import BLUE, Box, solid_model

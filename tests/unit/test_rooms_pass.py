@@ -19,7 +19,7 @@ from impostor.environment.cube import face_directions
 from impostor.errors import SettingsError
 from impostor.model import Material, Model
 from impostor.srgb import linear_from_srgb, srgb_from_linear
-from runtime.offscreen import Offscreen
+from runtime.gl.offscreen import Offscreen
 from tests.pictures import apart, filling, looking
 from tests.rooms import BRIGHT, DARK, EMPTY, meet, painted, turned_box, turned_sphere, windows
 from tests.solids import RED, Box, Sphere, solid_model

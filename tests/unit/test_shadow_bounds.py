@@ -5,7 +5,7 @@ import pytest
 
 from impostor.lighting import DirectionalLight
 from impostor.shadow_projection import Ground, along_light
-from runtime.shadow_bounds import CELL, box_corners, covered_cells, in_view, shadow_hulls
+from runtime.shadows.bounds import CELL, box_corners, covered_cells, in_view, shadow_hulls
 from tests.pictures import filling, looking
 
 WIDTH, HEIGHT = 200, 120

@@ -13,11 +13,12 @@ from impostor.srgb import srgb_from_linear
 from impostor.strips import silhouette_strips
 from impostor.views import direction
 from runtime import Instances
-from runtime.draw_calls import counted_draw_calls
-from runtime.grounds import GroundSurface
-from runtime.instances import Viewer, nearest_views, quads_toward
-from runtime.offscreen import Offscreen
-from runtime.shadow_strips import CastingFan
+from runtime.gl.draw_calls import counted_draw_calls
+from runtime.gl.offscreen import Offscreen
+from runtime.ground.ground_pass import GroundSurface
+from runtime.instances.quads import nearest_views, quads_toward
+from runtime.shadows.strips import CastingFan
+from runtime.viewing.viewer import Viewer
 from tests.pictures import apart, bluish, filling, greenish, iou, looking, placed
 from tests.solids import BLUE, GREEN, Box, Sphere, solid_fan, solid_model
 
@@ -560,7 +561,7 @@ class TestSmallOnTheScreen:
         scene = filling(half, 0.3, 0.6), [light_at(-50, 45)]
         coarse, bare = (picture[..., 0].astype(float) for picture in ground(*scene))
         levels = {level for _, _, level in renderer._shadows._strips._held}
-        monkeypatch.setattr("runtime.shadow_strips.LARGEST_TEXEL", 1e-6)
+        monkeypatch.setattr("runtime.shadows.strips.LARGEST_TEXEL", 1e-6)
         renderer._shadows._frame = None
         fine = ground(*scene)[0][..., 0].astype(float)
         assert levels and 0 not in levels

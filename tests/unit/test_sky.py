@@ -13,7 +13,7 @@ from impostor.scene import Scene, SceneCamera, SceneRoom, Sun
 from impostor.sky import clear_sky, sky_of
 from impostor.sun import lighting_at, sky_color, sun_at
 from impostor.views import direction
-from runtime.sun_control import SunControl
+from runtime.walk.sun_control import SunControl
 
 BLUE, YELLOW = (0.2, 0.4, 0.7), (1.0, 0.9, 0.7)
 UP = (0.0, 1.0, 0.0)

@@ -12,10 +12,10 @@ from impostor.lighting import DirectionalLight
 from impostor.shadow_projection import LOWEST_LIGHT, Ground
 from impostor.srgb import linear_from_srgb, srgb_from_linear
 from impostor.views import direction
-from runtime import soft_light
-from runtime.ground_light import room_diffuse
-from runtime.grounds import GroundSurface
-from runtime.offscreen import Offscreen
+from runtime.gl.offscreen import Offscreen
+from runtime.ground.ground_light import room_diffuse
+from runtime.ground.ground_pass import GroundSurface
+from runtime.shadows import soft_light
 from tests import gl as raw
 from tests.pictures import filling, looking, placed
 from tests.solids import Box, Sphere, solid_fan, solid_model
@@ -186,7 +186,7 @@ class TestCost:
         renderer.add(solid_fan(Sphere((0, 1, 0), 0.3), views=16, elevation_deg=15, size=64), (0.5, 0, 0.5))
         lights, matrices = [light_at(130, elevation_deg, softness)], looking((3, 4, 7))
         found, _ = ground(lights, 0.2, matrices)
-        monkeypatch.setattr("runtime.shadow_bounds.EDGE", 1000)
+        monkeypatch.setattr("runtime.shadows.bounds.EDGE", 1000)
         renderer._shadows._frame = None
         everywhere, _ = ground(lights, 0.2, matrices)
         assert np.abs(found - everywhere).max() < 0.012

@@ -10,9 +10,9 @@ from impostor.files.fan_file import write_fan
 from impostor.files.ptm_file import write_ptm
 from impostor.files.scene_file import load_scene
 from impostor.ptm import quantise
-from runtime.canvas import Canvas
-from runtime.stage import Stage
-from runtime.walker import Walker
+from runtime.gl.canvas import Canvas
+from runtime.stage.stage import Stage
+from runtime.walk.walker import Walker
 from tests.ptms import matt_bumps
 from tests.solids import BLUE, RED, Box, solid_fan, solid_model
 

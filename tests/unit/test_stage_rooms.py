@@ -6,9 +6,9 @@ from OpenImageIO import ImageBuf, ImageSpec
 
 from impostor.environment.panorama import panorama_directions
 from impostor.errors import EnvironmentFileError
-from runtime.canvas import Canvas
-from runtime.stage import Stage
-from runtime.walker import Walker
+from runtime.gl.canvas import Canvas
+from runtime.stage.stage import Stage
+from runtime.walk.walker import Walker
 from tests.solids import Box, solid_model
 from tests.unit.test_stage import HIGH, LOW, bluish, reddish, write_ply
 

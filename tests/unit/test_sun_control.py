@@ -8,7 +8,7 @@ import pytest
 
 from impostor.lighting import DirectionalLight
 from impostor.scene import Scene, SceneCamera, SceneRoom, Sun
-from runtime.sun_control import USUAL_RATE, SunControl
+from runtime.walk.sun_control import USUAL_RATE, SunControl
 
 CAMERA = SceneCamera((0, 1, 5), (0, 1, 0))
 SUNNY = Scene(Path("s.toml"), CAMERA, sun=Sun(time_of_day=9.0))

@@ -13,16 +13,16 @@ from impostor.ptm.shading import ambient_gain, shaded
 from impostor.shadow_projection import Ground
 from impostor.srgb import linear_from_srgb, srgb_from_linear
 from impostor.views import direction
-from runtime import relit_surfaces
-from runtime.gl_state import preserved_state
-from runtime.gpu import make_context
-from runtime.grounds import GroundSurface
-from runtime.instances import Viewer
-from runtime.offscreen import Offscreen
-from runtime.relit_surfaces import PATIENCE
-from runtime.surface_buffers import MOST_LIGHTS, lights_at
-from runtime.surfaces import Surface, SurfacePass, lying_on, rectangle
-from runtime.tangents import tangent_mesh
+from runtime.gl.context import make_context
+from runtime.gl.offscreen import Offscreen
+from runtime.gl.state import preserved_state
+from runtime.ground.ground_pass import GroundSurface
+from runtime.meshes.tangents import tangent_mesh
+from runtime.surfaces import relit_pictures
+from runtime.surfaces.buffers import MOST_LIGHTS, lights_at
+from runtime.surfaces.relit_pictures import PATIENCE
+from runtime.surfaces.surface_pass import Surface, SurfacePass, lying_on, rectangle
+from runtime.viewing.viewer import Viewer
 from tests import gl as raw
 from tests.conftest import live_objects
 from tests.gl import gl
@@ -470,7 +470,7 @@ class TestRelitPictures:
         assert live_objects() == bare
 
     def test_pictures_keep_within_their_room(self, surfaces, draw, monkeypatch):
-        monkeypatch.setattr(relit_surfaces, "MOST_TEXELS", 2 * SIZE * SIZE)
+        monkeypatch.setattr(relit_pictures, "MOST_TEXELS", 2 * SIZE * SIZE)
         model = rectangle(0.4, 0.4)
         walls = [Surface(make_ptm(), model, world_from_model=placed((0.45 * i - 0.7, 0, 0))) for i in range(4)]
         for _ in range(PATIENCE + 2):

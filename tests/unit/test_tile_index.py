@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from runtime.tiles import TileIndex
+from runtime.fans.tiles import TileIndex
 
 
 def test_tiles_are_found_in_whatever_order_they_came():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from impostor.errors import GpuError
-from runtime.gpu import tiles_to_atlas
-from runtime.tiles import GUTTER, CacheFull, TileCache
+from runtime.fans.tiles import GUTTER, CacheFull, TileCache
+from runtime.gl.uploads import tiles_to_atlas
 
 
 @pytest.fixture

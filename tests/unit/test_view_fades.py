@@ -8,7 +8,7 @@ import pytest
 from impostor.errors import SettingsError
 from runtime import LevelOfDetail
 from runtime.animation import AnimatedFan, AnimatedInstances
-from runtime.view_fades import VIEW_FADE_SECONDS, ViewFades
+from runtime.instances.view_fades import VIEW_FADE_SECONDS, ViewFades
 from tests.pictures import apart, filling
 from tests.solids import GREEN, RED, Box, Sphere, solid_fan, solid_model
 

@@ -10,12 +10,12 @@ from impostor.files.fan_file import write_fan
 from impostor.files.scene_file import load_scene
 from impostor.files.scene_watcher import SceneWatcher
 from impostor.normal_code import BYTE_TO_NORMAL
-from runtime.draw_calls import counted_draw_calls
-from runtime.overlay import panel_picture
-from runtime.scene_changes import SceneChanges
-from runtime.walk import HINT_SECONDS, Walk
-from runtime.walk_keys import HELD, KEYS, WINDOW
-from runtime.walker import MOVES, TURNS
+from runtime.gl.draw_calls import counted_draw_calls
+from runtime.stage.changes import SceneChanges
+from runtime.walk.keys import HELD, KEYS, WINDOW
+from runtime.walk.overlay import panel_picture
+from runtime.walk.walk import HINT_SECONDS, Walk
+from runtime.walk.walker import MOVES, TURNS
 from tests.data import ROOT
 from tests.solids import RED, Box, Sphere, solid_fan
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from runtime.walker import SPRINT, Walker
+from runtime.walk.walker import SPRINT, Walker
 
 AHEAD = {"forward": (0, 0, 1), "back": (0, 0, -1), "left": (1, 0, 0), "right": (-1, 0, 0)}
 

@@ -1,0 +1,1 @@
+"""From a fan's tiles to lit quads."""

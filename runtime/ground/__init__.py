@@ -1,0 +1,1 @@
+"""The plane that shadows fall on, and what lights it."""

@@ -1,0 +1,1 @@
+"""Where copies stand, and which picture of its fan each shows."""

@@ -1,0 +1,1 @@
+"""Polygon meshes beside the fans."""

@@ -1,0 +1,1 @@
+"""Meshes textured by Polynomial Texture Maps."""

@@ -1,0 +1,1 @@
+"""Who looks: cameras, and what passes know of them."""

@@ -1,0 +1,1 @@
+"""Through a scene by keys and mouse."""
