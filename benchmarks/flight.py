@@ -123,7 +123,8 @@ class Flight:
 
     def picture(self) -> Picture:
         """Draw a frame from scratch, although nothing may have moved."""
-        self.renderer._impostors._frame = self.renderer._shadows._frame = None
+        self.renderer._impostors._frame = None
+        self.renderer._shadows.mark_anew()
         self.walk.draw()
         return self.walk.picture().copy()
 

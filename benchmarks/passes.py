@@ -28,7 +28,8 @@ from runtime.gl.canvas import Canvas
 from runtime.ground.ground_pass import GroundPass
 from runtime.meshes.mesh_pass import MeshPass
 from runtime.shadows import strips
-from runtime.shadows.shadow_pass import ShadowPass
+from runtime.shadows.darkening import DarkeningPass
+from runtime.shadows.marks import MarkPass
 from runtime.walk.cli import ready_scene
 from runtime.walk.walk import Walk
 
@@ -44,8 +45,8 @@ PARTS: dict[str, tuple[str, tuple[tuple[Any, str], ...]]] = {
     "quads": ("impostor quads", ((impostor_pass._Drawing, "render"),)),
     "meshes": ("meshes", ((MeshPass, "draw_copies"),)),
     "casters": ("shadows: which copies cast", ((strips.CastingFan, "of"),)),
-    "marks": ("shadows: marks of strips", ((ShadowPass, "_mark"),)),
-    "darken": ("shadows: darkening the ground", ((ShadowPass, "_darken_ground"),)),
+    "marks": ("shadows: marks of strips", ((MarkPass, "draw"),)),
+    "darken": ("shadows: darkening the ground", ((DarkeningPass, "draw"),)),
     "ground": ("ground", ((GroundPass, "draw"),)),
     "clear": ("clearing the picture", ((Canvas, "clear"),)),
 }

@@ -1,6 +1,8 @@
-"""What a renderer has been given to draw: fans and meshes, and what they share on the GPU."""
+"""What a renderer has been given to draw: fans, meshes and surfaces, and what they share on the GPU."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import moderngl
 
@@ -13,10 +15,11 @@ from runtime.gl.state import preserved_state
 from runtime.instances.instances import Instances
 from runtime.meshes.bump import Bump
 from runtime.meshes.mesh_pass import MeshBuffers, MeshInstance
+from runtime.surfaces.surface_pass import Surface
 
 
 class Placed:
-    """Fans and meshes of a renderer; a fan's textures and a model's buffers are there once.
+    """Fans, meshes and surfaces of a renderer; a fan's textures and a model's buffers are there once.
 
     Parameters
     ----------
@@ -26,12 +29,15 @@ class Placed:
     ----------
     batches : list of Batch
     meshes : list of MeshInstance
+    surfaces : list of Surface
     """
 
     def __init__(self, ctx: moderngl.Context):
         self._ctx = ctx
         self.batches: list[Batch] = []
         self.meshes: list[MeshInstance] = []
+        self.surfaces: list[Surface] = []
+        self._casting: dict[int, MeshInstance] = {}
 
     def add(self, instances: Instances, model: Model | None, level_of_detail: LevelOfDetail | None) -> None:
         """Take copies of a fan, and the mesh that they are near the camera."""
@@ -44,10 +50,18 @@ class Placed:
                 textures = FanTextures(self._ctx, fan)
         self.batches.append(Batch(instances, textures, levels))
 
+    def add_surface(self, surface: Surface) -> None:
+        """Take a surface."""
+        self._casting[id(surface)] = MeshInstance(self.mesh_buffers(surface.model))
+        self.surfaces.append(surface)
+
     def remove(self, placed: object) -> list[Fan]:
-        """Let go of copies or of a mesh, if they are there; returns the fans that are not there any more."""
+        """Let go of copies, a mesh or a surface, if it is there; returns the fans that are not there any more."""
         batches = [batch for batch in self.batches if batch.instances is placed]
         meshes = [mesh for mesh in self.meshes if mesh is placed]
+        if any(surface is placed for surface in self.surfaces):
+            self.surfaces = [surface for surface in self.surfaces if surface is not placed]
+            meshes.append(self._casting.pop(id(placed)))
         self.batches = [batch for batch in self.batches if batch.instances is not placed]
         self.meshes = [mesh for mesh in self.meshes if mesh is not placed]
         gone = [batch for batch in batches if not any(each.textures is batch.textures for each in self.batches)]
@@ -61,8 +75,9 @@ class Placed:
         return [batch.instances.fan for batch in gone]
 
     def holds(self, placed: object) -> bool:
-        """Whether copies or a mesh are there."""
-        return any(placed is each for each in (*(batch.instances for batch in self.batches), *self.meshes))
+        """Whether copies, a mesh or a surface is there."""
+        copies = (batch.instances for batch in self.batches)
+        return any(placed is each for each in (*copies, *self.meshes, *self.surfaces))
 
     @property
     def levels(self) -> list[Levels]:
@@ -74,6 +89,12 @@ class Placed:
         """Those that are drawn and cast shadows."""
         return [mesh for mesh in self.meshes if mesh.visible]
 
+    def casting(self, surface: Surface) -> MeshInstance:
+        """The mesh that casts shadows in a surface's place."""
+        mesh = self._casting[id(surface)]
+        mesh.world_from_model = surface.matrix()
+        return mesh
+
     def mesh_buffers(self, model: Model, bump: Bump | None = None) -> MeshBuffers:
         """A model's buffers, shared by everything that draws it with the same bumps."""
         for buffers in self._buffers().values():
@@ -83,7 +104,10 @@ class Placed:
             return MeshBuffers(self._ctx, model, bump)
 
     def _buffers(self) -> dict[int, MeshBuffers]:
-        return {id(owner.buffers): owner.buffers for owner in (*self.meshes, *self.levels)}
+        return {id(owner.buffers): owner.buffers for owner in self._owners()}
+
+    def _owners(self) -> Iterator[MeshInstance | Levels]:
+        yield from (*self.meshes, *self.levels, *self._casting.values())
 
     def release(self) -> None:
         """Free everything on the GPU."""
@@ -93,3 +117,5 @@ class Placed:
             buffers.release()
         self.batches.clear()
         self.meshes.clear()
+        self.surfaces.clear()
+        self._casting.clear()

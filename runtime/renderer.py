@@ -34,6 +34,7 @@ from runtime.meshes.mesh_pass import OUTPUTS, MeshInstance, MeshPass, check_mesh
 from runtime.placed import Placed
 from runtime.rooms.environments import RoomTable, check_rooms
 from runtime.rooms.room_pass import RoomPass, number_of, to_show
+from runtime.shadows.receiver import Receiver
 from runtime.shadows.shadow_pass import ShadowPass
 from runtime.surfaces.surface_pass import Surface, SurfacePass
 from runtime.viewing.viewer import Viewer
@@ -94,7 +95,6 @@ class ImpostorRenderer(LightSettings, FanSettings):
             self._room_table, self._room_pass = RoomTable(ctx), RoomPass(ctx)
         self._clock, self._statistics = FrameClock(), self._mesh_pass.statistics
         self._placed = Placed(ctx)
-        self._surfaces: list[Surface] = []
 
     def add(
         self,
@@ -202,8 +202,8 @@ class ImpostorRenderer(LightSettings, FanSettings):
         matrix = np.eye(4) if world_from_model is None else np.asarray(world_from_model, float)
         surface = Surface(ptm, model, tiling, matrix, gloss or Gloss())
         with preserved_state(self._ctx):
-            self._surface_pass.prepare([*self._surfaces, surface])
-        self._surfaces.append(surface)
+            self._surface_pass.prepare([*self._placed.surfaces, surface])
+        self._placed.add_surface(surface)
         return surface
 
     def remove(self, placed: Instances | MeshInstance | Surface | AnimatedInstances) -> None:
@@ -217,15 +217,15 @@ class ImpostorRenderer(LightSettings, FanSettings):
         self._check_in_use()
         parts = placed.poses if isinstance(placed, AnimatedInstances) else (placed,)
         for part in parts:
-            if not self._placed.holds(part) and not any(surface is part for surface in self._surfaces):
+            if not self._placed.holds(part):
                 expected = "something that was added to this renderer and not taken away since"
                 raise SettingsError("remove", f"{with_article(type(placed))}; expected {expected}")
         with preserved_state(self._ctx):
-            self._surfaces = [surface for surface in self._surfaces if all(surface is not part for part in parts)]
-            self._surface_pass.prepare(self._surfaces)
             for fan in (fan for part in parts for fan in self._placed.remove(part)):
                 self._impostors.forget()
                 self._shadows.forget(fan)
+            self._surface_pass.prepare(self._placed.surfaces)
+            self._shadows.keep(map(id, self._placed.surfaces))
 
     def advance(self, seconds: float) -> None:
         """Tell the time that has passed since the last frame, once a frame, before it is drawn.
@@ -345,7 +345,7 @@ class ImpostorRenderer(LightSettings, FanSettings):
         """Draw the surfaces that `add_surface` placed; parameters as `draw`. Draw shadows after the ground's."""
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
             lights = [*self._lights, *self.local_lights]
-            self._surface_pass.draw(state, self._surfaces, viewer, lights, self._ambient, output, self._rooms)
+            self._surface_pass.draw(state, self._placed.surfaces, viewer, lights, self._ambient, output, self._rooms)
 
     def draw_ground(
         self, clip_from_view: ArrayLike, view_from_world: ArrayLike, ground: Ground, surface: GroundSurface
@@ -361,10 +361,10 @@ class ImpostorRenderer(LightSettings, FanSettings):
         self,
         clip_from_view: ArrayLike,
         view_from_world: ArrayLike,
-        ground: Ground,
+        ground: Ground | Surface,
         surface: GroundSurface | None = None,
     ) -> None:
-        """Darken the caller's ground where fans and meshes keep light from it.
+        """Darken the ground, or a flat surface, where fans, meshes and other surfaces keep light from it.
 
         Depth is tested against what is drawn already and not written. Every light that is above the ground casts, with
         a penumbra where it has a softness, and so do the brightest lights of rooms; see `shadow_lights` and
@@ -373,16 +373,31 @@ class ImpostorRenderer(LightSettings, FanSettings):
         Parameters
         ----------
         clip_from_view, view_from_world : array_like, (4, 4) float
-        ground : Ground
-            The plane on which the caller has drawn a ground.
+        ground : Ground or Surface
+            The plane on which the caller has drawn a ground; or a surface of this renderer, which `draw_surfaces` has
+            drawn.
         surface : GroundSurface, optional
             What `draw_ground` has drawn: shadows fade out where it does.
+
+        Raises
+        ------
+        SettingsError
+            A surface that is not flat, or not in this renderer.
         """
-        check_type("ground", ground, Ground)
+        placed = self._placed
+        if isinstance(ground, Surface):
+            if not placed.holds(ground):
+                raise SettingsError("ground", "a Surface that is not in this renderer; expected one that is")
+            receiver = Receiver.of(ground, placed.casting(ground))
+        else:
+            check_type("ground", ground, Ground, " or a Surface")
+            receiver = Receiver(ground)
         if surface is not None:
             check_type("surface", surface, GroundSurface)
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
-            self._shadows.draw(state, self._placed.batches, self._placed.visible_meshes, viewer, self, ground, surface)
+            surfaces = [placed.casting(each) for each in placed.surfaces]
+            casters = placed.batches, placed.visible_meshes, surfaces
+            self._shadows.draw(state, *casters, viewer, self, receiver, surface)
 
     @contextmanager
     def _frame(self, clip_from_view: ArrayLike, view_from_world: ArrayLike) -> Iterator[tuple[CallerState, Viewer]]:
@@ -426,7 +441,6 @@ class ImpostorRenderer(LightSettings, FanSettings):
     def release(self) -> None:
         """Free everything on the GPU; the context stays the caller's."""
         self._placed.release()
-        self._surfaces.clear()
         self._released = True
         passes = self._impostors, self._mesh_pass, self._ground_pass, self._shadows, self._surface_pass
         for part in (*passes, self._room_pass, self._table, self._room_table):

@@ -1,12 +1,17 @@
 """The OpenGL context that the tests share, and the check that each of them leaves nothing behind in it."""
 
 import pytest
+from hypothesis import settings
 
 from runtime import ImpostorRenderer
 from runtime.gl.context import make_context
 from runtime.gl.offscreen import Offscreen
 from tests import gl as raw
 from tests.gl import gl
+
+# How long an example takes says how busy the machine is.
+settings.register_profile("patient", deadline=None)
+settings.load_profile("patient")
 
 KINDS = ("Texture", "Buffer", "Framebuffer", "VertexArray", "Renderbuffer", "Sampler", "Program")
 FAILED = pytest.StashKey[bool]()

@@ -52,6 +52,18 @@ def in_view(hulls: NDArray[np.float64]) -> NDArray[np.bool_]:
     return ~np.any(np.all(beyond, axis=1), axis=-1)
 
 
+def window_around(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """From clip space (4, 4) to that of a window around points (N, 4), clip space; the whole picture's at most."""
+    w = corners[:, 3:]
+    if (w <= 1e-9).any():
+        return np.eye(4)
+    low, high = (np.clip(edge(corners[:, :2] / w, axis=0), -1, 1) for edge in (np.min, np.max))
+    scale = 2 / np.maximum(high - low, 1e-6)
+    window = np.diag([*scale, 1.0, 1.0])
+    window[:2, 3] = -scale * (low + high) / 2
+    return window
+
+
 def covered_cells(hulls: NDArray[np.float64], width: int, height: int) -> NDArray[np.intp]:
     """Cells of the picture that hulls may touch.
 

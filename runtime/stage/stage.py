@@ -231,21 +231,31 @@ class Stage:
         canvas.resolve()
 
     def _draw_beneath(self, camera: Camera, output: str, shadows: bool) -> None:
-        """Draw what is there before the instances: surfaces, meshes, the ground and all shadows on it."""
+        """Draw what is there before the instances: the ground, surfaces, meshes, and all shadows on them.
+
+        Shadows on the ground come before what lies on it: drawn later they would be seen through it from afar.
+        """
         renderer, matrices, ground = self.renderer, camera.matrices, self.scene.ground
         self._lay_floor(camera)
+        if ground is not None and ground.ptm is None:
+            self._draw_ground(ground, camera, output, shadows)
         renderer.draw_surfaces(*matrices, output)
         renderer.draw_meshes(*matrices, output)
-        if ground is None:
-            return
+        if shadows:
+            if ground is not None and ground.ptm is not None:
+                renderer.draw_shadows(*matrices, ground.plane)
+            for wall in self._surfaces.things.values():
+                renderer.draw_shadows(*matrices, wall)
+
+    def _draw_ground(self, ground: SceneGround, camera: Camera, output: str, shadows: bool) -> None:
         background = self._background
         if any(room.shape == "far" for room in self._rooms.visible):
             background = UNSEEN
         surface = ground_surface(ground, self._ground_texture, camera, background, output)
-        if ground.ptm is None and ground.visible:
-            renderer.draw_ground(*matrices, ground.plane, surface)
+        if ground.visible:
+            self.renderer.draw_ground(*camera.matrices, ground.plane, surface)
         if shadows:
-            renderer.draw_shadows(*matrices, ground.plane, surface if ground.ptm is None else None)
+            self.renderer.draw_shadows(*camera.matrices, ground.plane, surface)
 
     def _capture_rooms(self) -> None:
         """Take the pictures of the rooms that show the scene itself, as it is lit now, without what mirrors."""

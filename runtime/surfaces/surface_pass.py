@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import moderngl
 import numpy as np
@@ -25,6 +26,8 @@ from runtime.surfaces.buffers import Light, SurfaceBuffers, bind_lights, lights_
 from runtime.surfaces.relit_pictures import MOST_TERMS, RelitPicture, RelitPictures, bind_terms, packed_terms
 from runtime.surfaces.textures import KINDS, PtmTextures
 from runtime.viewing.viewer import Viewer
+
+FLAT = 1e-4  # of a model's radius: what reaches no farther out of a plane is flat
 
 
 @dataclass(eq=False)
@@ -76,6 +79,34 @@ class Surface:
         if not abs(np.linalg.det(matrix)) > 0:
             raise SettingsError("surface", "world_from_model has no inverse; expected a matrix that has one")
         return matrix
+
+    def plane(self) -> Ground:
+        """The plane in the world that a flat model lies in, its normal on the model's front.
+
+        Raises
+        ------
+        SettingsError
+            A model that is not flat.
+        """
+        normal, point = self._flat
+        matrix = self.matrix()
+        # Uniform scale: normals turn as the model does.
+        normal = matrix[:3, :3] @ normal
+        return Ground(normal, float(normal @ (matrix[:3, :3] @ point + matrix[:3, 3])))
+
+    @cached_property
+    def _flat(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Normal (3,) and a point (3,) of the model's plane, model space."""
+        positions = np.concatenate([part.positions for part in self.model.primitives]).astype(float)
+        normal = np.concatenate([part.normals for part in self.model.primitives]).astype(float).sum(axis=0)
+        normal /= max(float(np.linalg.norm(normal)), 1e-9)
+        middle = positions.mean(axis=0)
+        off = float(np.abs((positions - middle) @ normal).max())
+        if not off <= FLAT * self.model.radius or not np.linalg.norm(normal) > 0.5:
+            raise SettingsError(
+                "surface", f"{self.model.name} reaches {off:g} m out of a plane; expected a flat model to cast on"
+            )
+        return normal, middle
 
 
 def rectangle(width: float, height: float) -> Model:

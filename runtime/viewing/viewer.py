@@ -56,6 +56,11 @@ class Viewer:
         """Equal for two viewers that see the same."""
         return self.clip_from_view.tobytes(), self.view_from_world.tobytes(), self.viewport
 
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the viewport in pixels, at least 1."""
+        return max(self.viewport[2], 1), max(self.viewport[3], 1)
+
     @cached_property
     def clip_from_world(self) -> NDArray[np.float64]:
         """(4, 4) float64."""

@@ -211,7 +211,7 @@ class TestCost:
         calls = []
         for count in (1, 40):
             with counted_draw_calls() as counted:
-                renderer._shadows._frame = None
+                renderer._shadows.mark_anew()
                 renderer.draw_shadows(*ABOVE, LEVEL)
             calls.append(counted.count)
             places = np.random.default_rng(3).uniform(-1, 1, (count, 3)) * (1, 0, 1)
@@ -234,11 +234,11 @@ class TestCost:
             cos, sin = np.cos(angle), np.sin(angle)
             mesh.world_from_model = np.array([[cos, -sin, 0, 0], [sin, cos, 0, 0.4], [0, 0, 1, 0], [0, 0, 0, 1]])
             hidden()
-            assert 1 <= len(renderer._shadows._contacts._held) <= 3
+            assert 1 <= len(renderer._shadows._mark_pass._contacts._held) <= 3
         renderer.remove(mesh)
         renderer.add(solid_fan(CUBE, **RING))
         hidden()
-        assert len(renderer._shadows._contacts._held) == 1
+        assert len(renderer._shadows._mark_pass._contacts._held) == 1
 
     def test_state_is_left_as_it_was(self, renderer, screen):
         renderer.add(solid_fan(CUBE, **RING))

@@ -38,6 +38,7 @@ SURFACE = GroundSurface(texture=np.full((3, 5, 4), 200, np.uint8))
 CALLS = {
     "ground": lambda renderer: renderer.draw_ground(*MATRICES, LEVEL, SURFACE),
     "shadows": lambda renderer: renderer.draw_shadows(*MATRICES, LEVEL),
+    "shadows on a surface": lambda renderer: renderer.draw_shadows(*MATRICES, renderer._placed.surfaces[0]),
     "meshes": lambda renderer: renderer.draw_meshes(*MATRICES),
     "surfaces": lambda renderer: renderer.draw_surfaces(*MATRICES),
     "rooms": lambda renderer: renderer.draw_rooms(*MATRICES),
@@ -50,11 +51,19 @@ CALLS = {
     "add bumps": lambda renderer: renderer.add_mesh(CARD, bump=BUMP),
     "take away": lambda renderer: [
         renderer.remove(each)
-        for each in (*renderer._surfaces, *renderer._placed.meshes, *(x.instances for x in renderer._placed.batches))
+        for each in (
+            *renderer._placed.surfaces,
+            *renderer._placed.meshes,
+            *(x.instances for x in renderer._placed.batches),
+        )
     ],
     "add a surface": lambda renderer: renderer.add_surface(PTM, rectangle(1, 1)),
 }
-PICTURE = ("ground", "surfaces", "shadows", "meshes", "fans", "rooms")
+PICTURE = ("ground", "surfaces", "shadows", "shadows on a surface", "meshes", "fans", "rooms")
+
+
+def everything(placed):
+    return [*placed.surfaces, *placed.meshes, *(batch.instances for batch in placed.batches)]
 
 
 def scene(renderer):

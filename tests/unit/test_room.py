@@ -72,7 +72,7 @@ def angle(first, second):
 
 
 @given(rooms(), arrays(np.float64, (8, 3), elements=st.sampled_from([0, 0.999]) | st.floats(-0.999, 0.999)), directions)
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_a_ray_from_anywhere_inside_ends_where_a_search_finds_the_wall(room, places, toward):
     """Within a tenth of a pixel of faces of 1024."""
     points = points_inside(room, places * 0.999)
@@ -82,7 +82,7 @@ def test_a_ray_from_anywhere_inside_ends_where_a_search_finds_the_wall(room, pla
 
 
 @given(rooms(), arrays(np.float64, (8, 3), elements=st.sampled_from([-1, 0, 1]) | st.floats(-2, 2)), directions)
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_directions_are_finite_wherever_the_point_is(room, places, toward):
     """On walls, edges and corners, and outside: a number, and a direction that a look-up can take."""
     points = places @ room.world_from_room[:3, :3].T + room.world_from_room[:3, 3]

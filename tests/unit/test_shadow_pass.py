@@ -79,7 +79,7 @@ def light_at(azimuth_deg, elevation_deg, color=(1, 1, 1)):
 
 def marked(renderer):
     """Which corners of pixels the first light's shadow holds, (SIZE + 1, SIZE + 1) bool."""
-    marks = renderer._shadows._marks
+    marks = renderer._shadows._marks[None].texture
     pixels = np.frombuffer(marks.read(alignment=1), np.uint8)
     return pixels.reshape(SIZE + 1, SIZE + 1, marks.components)[::-1, :, 0] > 0
 
@@ -546,7 +546,7 @@ class TestFrameByFrame:
         else:
             scene["lights"] = [light_at(-20, 35)]
         after, _ = ground(**scene)
-        renderer._shadows._frame = None
+        renderer._shadows.mark_anew()
         fresh, _ = ground(**scene)
         assert (after != before).any()
         np.testing.assert_array_equal(after, fresh)
@@ -560,9 +560,9 @@ class TestSmallOnTheScreen:
         renderer.add(fan, [(x, 0, z) for x in (-4, 0, 4) for z in (-4, 0, 4)])
         scene = filling(half, 0.3, 0.6), [light_at(-50, 45)]
         coarse, bare = (picture[..., 0].astype(float) for picture in ground(*scene))
-        levels = {level for _, _, level in renderer._shadows._strips._held}
+        levels = {level for _, _, level in renderer._shadows._mark_pass._strips._held}
         monkeypatch.setattr("runtime.shadows.strips.LARGEST_TEXEL", 1e-6)
-        renderer._shadows._frame = None
+        renderer._shadows.mark_anew()
         fine = ground(*scene)[0][..., 0].astype(float)
         assert levels and 0 not in levels
         shade = (bare - fine).sum()

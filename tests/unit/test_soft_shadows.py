@@ -187,7 +187,7 @@ class TestCost:
         lights, matrices = [light_at(130, elevation_deg, softness)], looking((3, 4, 7))
         found, _ = ground(lights, 0.2, matrices)
         monkeypatch.setattr("runtime.shadows.bounds.EDGE", 1000)
-        renderer._shadows._frame = None
+        renderer._shadows.mark_anew()
         everywhere, _ = ground(lights, 0.2, matrices)
         assert np.abs(found - everywhere).max() < 0.012
 

@@ -263,3 +263,28 @@ def write_fan_for(loaded):
     (placement,) = loaded.instances
     placement.subject.fan.parent.mkdir()
     write_fan(placement.subject.fan, box_fan(RED))
+
+
+def test_shadows_fall_on_a_wall(stage, scene, seen, folder):
+    write_ptm(quantise(matt_bumps()[1]), folder / "wall.ptm")
+    wall = '[[surface]]\nptm = "wall.ptm"\nwidth = 8\nheight = 8\nposition = [0, 0, -1]\n'
+    text = SUN.replace("30", "60") + wall + COPY.format(x=0, z=0)
+    shown = stage(scene(text))
+    darker = (seen(shown, shadows=False) > seen(shown)).any(axis=(0, 2))
+    # The light is on the right, so the shadow on the left of the copy.
+    assert darker[10:20].any() and not darker[44:].any()
+
+
+@pytest.mark.parametrize("back", [5, 14, 40])
+def test_shadows_on_the_ground_are_not_seen_through_what_lies_on_it(stage, scene, seen, folder, back):
+    """The light is right behind the viewer: the shadow of a panel at two centimetres' height lies all under it."""
+    write_ptm(quantise(matt_bumps()[1]), folder / "panel.ptm")
+    panel = '[[surface]]\nptm = "panel.ptm"\nwidth = 2\nheight = 2\nposition = [0, 0.02, 0]\npitch_deg = 90\n'
+    sun = SUN.replace("30", "0").replace("40", "10")
+    shown = scene(GROUND + sun + panel)
+    eye = (0.0, back * np.tan(np.radians(10)), float(back))
+    shown = stage(replace(shown, camera=replace(shown.camera, eye=eye, target=(0.0, 0.0, 0.0), fov_deg=100 / back)))
+    bare = seen(shown, shadows=False)
+    # Four pixels at the panel's corners may be partly ground.
+    assert (seen(shown) != bare).any(axis=-1).sum() <= 4
+    assert np.ptp(bare[..., 0]) > 30

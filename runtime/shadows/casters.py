@@ -1,0 +1,99 @@
+"""Who casts shadows: copies of fans and of meshes, and where their bounding boxes are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from impostor.lighting import DirectionalLight
+from runtime.fans.batch import Batch
+from runtime.meshes.mesh_pass import MeshCopies, MeshInstance
+from runtime.shadows.bounds import in_view, shadow_hulls
+from runtime.shadows.meshes import mesh_corners
+from runtime.shadows.receiver import Receiver
+from runtime.shadows.strips import CastingFan
+from runtime.viewing.viewer import Viewer
+
+FLUSH = 1e-6  # of a box's size: what reaches no farther out of a plane lies in it
+
+
+@dataclass(frozen=True, eq=False)
+class Casters:
+    """Copies of a fan or of a mesh.
+
+    Parameters
+    ----------
+    copies : CastingFan or MeshCopies
+    corners : ndarray, (N, 8, 3) float64
+        Of their bounding boxes, world space.
+    clip_from_shadow : tuple of ndarray, (N or 1, 4, 4) float64
+        From the true shadow: to where it may be seen.
+    receiver : Receiver
+    window : ndarray, (4, 4) float64
+        `Receiver.window`.
+    stand : bool
+        Whether they darken what is around their feet.
+    """
+
+    copies: CastingFan | MeshCopies
+    corners: NDArray[np.float64]
+    clip_from_shadow: tuple[NDArray[np.float64], ...]
+    receiver: Receiver
+    window: NDArray[np.float64]
+    stand: bool = True
+
+    @property
+    def triangles(self) -> int:
+        """Of one copy; 0 where they do not count."""
+        return self.copies.buffers.triangle_count if isinstance(self.copies, MeshCopies) else 0
+
+    def shadows(self, lights: Sequence[DirectionalLight]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Which copies (M,) cast what may be seen, and hulls (M, K, 4) of their shadows from all lights, clip space."""
+        ground = self.receiver.ground
+        hulls = [shadow_hulls(self.corners, each, light, ground) for light in lights for each in self.clip_from_shadow]
+        hull = np.concatenate(hulls, axis=1)
+        chosen = np.flatnonzero(self._in_front & in_view(hull @ self.window.T))
+        return chosen, hull[chosen]
+
+    @property
+    def _in_front(self) -> NDArray[np.bool_]:
+        """What lies behind the receiver casts nothing on it; nor does a surface in its plane, such as itself."""
+        heights = self.corners @ self.receiver.ground.normal - self.receiver.ground.offset
+        size = np.abs(self.corners - self.corners[:, :1]).max(axis=(1, 2))
+        return heights.max(axis=1) > (-FLUSH if self.stand else FLUSH) * size
+
+
+def casters_for(
+    receiver: Receiver,
+    viewer: Viewer,
+    fans: Sequence[Batch],
+    meshes: Sequence[MeshInstance],
+    surfaces: Sequence[MeshInstance],
+) -> list[Casters]:
+    """All that can cast on a receiver.
+
+    Parameters
+    ----------
+    receiver : Receiver
+    viewer : Viewer
+    fans : sequence of Batch
+    meshes : sequence of MeshInstance
+    surfaces : sequence of MeshInstance
+        They cast as meshes do, and have no feet.
+    """
+    clip, ground, window = viewer.clip_from_world, receiver.ground, receiver.window(viewer)
+    found = []
+    for fan in fans:
+        cast = CastingFan.of(fan.instances, viewer, ground, fan.levels and fan.levels.fan_share)
+        # The shadow of a fan lies between where it meets the picture's feet and where the light casts it.
+        between = clip @ cast.records["rows"].astype(float), clip[None]
+        found.append(Casters(cast, cast.corners(), between, receiver, window))
+    for stand, given in ((True, meshes), (False, surfaces)):
+        found += [
+            Casters(copies, mesh_corners(copies), (clip[None],), receiver, window, stand)
+            for copies in MeshCopies.gathered(given)
+        ]
+    return found
