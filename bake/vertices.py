@@ -52,6 +52,7 @@ def vertex_records(primitive: Primitive, origin: NDArray[Any]) -> tuple[NDArray[
     Returns
     -------
     vertices : ndarray, (N,) of position 3 float32, normal 3 float32 [, uv 2 float32] [, color 4 float16, linear]
+        [, normal_uv 2 float32, tangent 4 float32]
     triangles : ndarray, (M, 3) uint32
     """
     fields: dict[str, NDArray[Any]] = {
@@ -63,6 +64,8 @@ def vertex_records(primitive: Primitive, origin: NDArray[Any]) -> tuple[NDArray[
     if primitive.colors is not None:
         linear = np.concatenate([LINEAR_FROM_SRGB[primitive.colors[:, :3]], primitive.colors[:, 3:] / 255], axis=1)
         fields["color"] = linear.astype(np.float16)
+    if primitive.normal_uvs is not None and primitive.tangents is not None:
+        fields["normal_uv"], fields["tangent"] = primitive.normal_uvs, primitive.tangents
     triangles = np.ascontiguousarray(primitive.triangles, np.uint32)
     order: Any = slice(None)
     if len(triangles) >= REORDER_FROM:

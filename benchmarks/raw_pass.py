@@ -55,12 +55,12 @@ class RawPass:
             self._framebuffer.use()
             self._framebuffer.clear()
             self._ctx.enable(moderngl.DEPTH_TEST)
-            for program, vertex_array, texture, double_sided in self._draws:
+            for program, vertex_array, textures, double_sided in self._draws:
                 program["V"].write(view_from_model.T.astype("f4").tobytes())
                 program["P"].write(clip_from_view.T.astype("f4").tobytes())
                 program["depth_transform"] = 1 / (high - low), -low / (high - low)
-                if texture is not None:
-                    texture.use(0)
+                for unit, texture in enumerate(textures):
+                    texture.use(unit)
                 (self._ctx.disable if double_sided else self._ctx.enable)(moderngl.CULL_FACE)
                 vertex_array.render()
             return CapturedView(view, self._read(0, "f1", np.uint8), self._read(1, "nu2", np.uint16))
@@ -74,28 +74,36 @@ class RawPass:
         self._framebuffer.read_into(pixels, components=4, attachment=attachment, dtype=kind)
         return pixels[::-1]
 
-    def _draw(self, primitive: Primitive) -> tuple[Any, moderngl.VertexArray, moderngl.Texture | None, bool]:
-        material, texture = primitive.material, None
+    def _draw(self, primitive: Primitive) -> tuple[Any, moderngl.VertexArray, list[moderngl.Texture], bool]:
+        material, pictures = primitive.material, {}
         vertices, triangles = vertex_records(primitive, self._origin)
         names = list(vertices.dtype.names or ())
         defines = ["HAS_COLOR"] if "color" in names else []
         if "uv" in names:
             defines.append("HAS_TEXTURE")
-            texture = self._texture(material.texture)
+            pictures["base_texture"] = self._texture(material.texture)
+        if "tangent" in names and material.normal_map is not None:
+            defines.append("HAS_NORMAL_MAP")
+            pictures["normal_map"] = self._texture(material.normal_map.picture)
         if material.alpha_mode != "OPAQUE":
             defines.append(f"ALPHA_{material.alpha_mode}")
         program = self._ctx.program(_source("layers.vert", defines), _source("layers.frag", defines))
         program["base_color"] = tuple(material.base_color)
         if material.alpha_mode == "MASK":
             program["alpha_cutoff"] = material.alpha_cutoff
-        formats = {"position": "3f", "normal": "3f", "uv": "2f", "color": "4f2"}
+        if material.normal_map is not None and "normal_map" in pictures:
+            program["normal_scale"] = material.normal_map.scale
+        for unit, name in enumerate(pictures):
+            program[name] = unit
+        formats = {"position": "3f", "normal": "3f", "uv": "2f", "color": "4f2", "normal_uv": "2f", "tangent": "4f"}
         layout = (self._ctx.buffer(vertices), " ".join(formats[name] for name in names), *names)
         vertex_array = self._ctx.vertex_array(program, [layout], self._ctx.buffer(triangles))
-        return program, vertex_array, texture, material.double_sided
+        return program, vertex_array, list(pictures.values()), material.double_sided
 
     def _texture(self, pixels: Any) -> moderngl.Texture:
-        height, width = pixels.shape[:2]
-        texture = self._ctx.texture((width, height), 4, np.ascontiguousarray(pixels), internal_format=SRGB8_ALPHA8)
+        height, width, channels = pixels.shape
+        kind: Any = {"internal_format": SRGB8_ALPHA8} if channels == 4 else {"alignment": 1}
+        texture = self._ctx.texture((width, height), channels, np.ascontiguousarray(pixels), **kind)
         texture.build_mipmaps()
         return texture
 

@@ -15,13 +15,13 @@ from impostor.errors import ModelError, ModelWarning, SettingsError
 from impostor.importing.checks import CHECKS, prepared
 from impostor.importing.distance import Distance
 from impostor.importing.gltf_scene import read_gltf
-from impostor.importing.materials import Material
+from impostor.importing.materials import Material, NormalMap
 from impostor.importing.mesh_parts import imported_parts
 from impostor.importing.parts import MOST_TRIANGLES, Part, checked, finished_part, joined
 from impostor.importing.sources import ModelFiles
 from impostor.paths import check_path
 
-__all__ = ["SUFFIXES", "Material", "Model", "Primitive", "load_model"]
+__all__ = ["SUFFIXES", "Material", "Model", "NormalMap", "Primitive", "load_model"]
 
 SUFFIXES = tuple(sorted((".glb", ".gltf", *CHECKS)))
 SMALLEST_SIZE = 1e-18
@@ -51,6 +51,12 @@ class Primitive:
     triangles : ndarray, (M, 3) uint32
         Counter-clockwise about their normals; none of zero area.
     material : Material
+    normal_uvs : ndarray, (N, 2) float32, or None
+        As `uvs`, of the material's normal map; as `tangents` there where it has one.
+    tangents : ndarray, (N, 4) float32, or None
+        Unit, toward the right of the normal map's picture and across the normals; w is -1 where the picture is
+        mirrored, so that `w * cross(normal, tangent)` points up in it. x, y and z are 0 where it lies in no direction
+        and the normals are as they are.
     """
 
     positions: np.ndarray
@@ -59,6 +65,8 @@ class Primitive:
     colors: np.ndarray | None
     triangles: np.ndarray
     material: Material = field(default_factory=Material)
+    normal_uvs: np.ndarray | None = None
+    tangents: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +124,7 @@ class Model:
             Smooth ones are computed when absent.
         colors : array_like, (N, 4) uint8, optional
         uvs : array_like, (N, 2) float, optional
+            Of the texture and of the normal map.
         material : Material, optional
         name : str
 
@@ -125,8 +134,9 @@ class Model:
             When an index is out of range, a number is not finite, or no triangle has any area.
         """
         normals, uvs, colors = (None if array is None else np.asarray(array) for array in (normals, uvs, colors))
-        if material is not None and material.texture is not None and uvs is None:
-            raise ModelError(name, "material has a texture and uvs are None; expected uvs of shape (N, 2)")
+        for kind in ("texture", "normal_map"):
+            if material is not None and getattr(material, kind) is not None and uvs is None:
+                raise ModelError(name, f"material has a {kind} and uvs are None; expected uvs of shape (N, 2)")
         part = Part(
             "arrays",
             np.asarray(positions),
@@ -135,6 +145,7 @@ class Model:
             uvs,
             colors,
             material=material or Material(),
+            normal_uvs=uvs if material is not None and material.normal_map is not None else None,
         )
         return _assembled(name, name, [part], np.pi, welded=False)
 
@@ -235,13 +246,17 @@ def _assembled(where, name: str, parts: list[Part], crease: float, welded=True, 
 
 
 def _primitive(part: Part) -> Primitive:
+    def contiguous(array: np.ndarray | None, kind: type = np.float32) -> np.ndarray | None:
+        return None if array is None else np.ascontiguousarray(array, kind)
+
     assert part.normals is not None
-    uvs = part.uvs
     return Primitive(
         np.ascontiguousarray(part.positions),
         np.ascontiguousarray(part.normals, np.float32),
-        None if uvs is None else np.ascontiguousarray(uvs, np.float32),
-        None if part.colors is None else np.ascontiguousarray(part.colors, np.uint8),
+        contiguous(part.uvs),
+        contiguous(part.colors, np.uint8),
         np.ascontiguousarray(part.triangles, np.uint32),
         part.material,
+        contiguous(part.normal_uvs),
+        contiguous(part.tangents),
     )

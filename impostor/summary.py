@@ -79,7 +79,8 @@ def model_summary(path: Path, up: str = "y") -> dict[str, Any]:
     """A description of a model file, ready for JSON."""
     model = load_model(path, up=up)
     textures = {id(part.material.texture): part.material.texture for part in model.primitives}
-    sizes = [f"{t.shape[1]}x{t.shape[0]}" for t in textures.values() if t is not None]
+    maps = {id(part.material.normal_map): part.material.normal_map for part in model.primitives}
+    normals = [found.picture for found in maps.values() if found is not None]
     return {
         "file": str(path),
         "bytes": path.stat().st_size,
@@ -87,12 +88,17 @@ def model_summary(path: Path, up: str = "y") -> dict[str, Any]:
         "triangles": model.triangle_count,
         "vertices": model.vertex_count,
         "materials": [f"{part.material.name} ({part.material.alpha_mode.lower()})" for part in model.primitives],
-        "textures": sizes,
+        "textures": _sizes([texture for texture in textures.values() if texture is not None]),
+        "normal_maps": _sizes(normals),
         "vertex_colors": any(part.colors is not None for part in model.primitives),
         "bounds_m": _ranges(model.bounds),
         "radius_m": _short(model.radius),
         "sha256": model.source_hash,
     }
+
+
+def _sizes(pictures: list[NDArray[np.uint8]]) -> list[str]:
+    return [f"{picture.shape[1]}x{picture.shape[0]}" for picture in pictures]
 
 
 def _ranges(bounds: NDArray[np.float64]) -> list[list[float]]:

@@ -159,7 +159,7 @@ class ImpostorRenderer(LightSettings, FanSettings):
         reflection : Reflection, optional
             What it mirrors of the rooms.
         bump : Bump, optional
-            For a model with texture coordinates.
+            For a model with texture coordinates; in the place of its own normal maps.
 
         Returns
         -------

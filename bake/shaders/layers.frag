@@ -9,6 +9,13 @@ uniform sampler2D base_texture;
 #ifdef HAS_COLOR
 in vec4 vertex_color;
 #endif
+#ifdef HAS_NORMAL_MAP
+in vec2 map_uv;
+in vec3 map_tangent;
+flat in float map_side; // -1 where the picture is mirrored
+uniform sampler2D normal_map;
+uniform float normal_scale;
+#endif
 
 uniform vec4 base_color; // linear
 #ifdef ALPHA_MASK
@@ -29,6 +36,15 @@ vec3 toward_camera(vec3 normal) {
     float square = dot(normal, normal);
     return square > 1e-6 ? normal * inversesqrt(square) : vec3(0.0, 0.0, 1.0);
 }
+
+#ifdef HAS_NORMAL_MAP
+// As `impostor.normal_map.mapped_normals`.
+vec3 mapped(vec3 normal) {
+    vec3 up = normalize(normal), right = map_tangent / max(length(map_tangent), 1e-6);
+    vec3 lean = (texture(normal_map, map_uv).rgb - 128.0 / 255.0) * (255.0 / 127.0) * vec3(normal_scale, normal_scale, 1.0);
+    return lean.x * right + lean.y * map_side * cross(up, right) + max(lean.z, 0.01) * up;
+}
+#endif
 
 #ifdef ALPHA_BLEND
 // The ordered dither of Bayer, 16 x 16: every aligned block of 4 x 4 samples holds 16 evenly spaced thresholds.
@@ -68,7 +84,11 @@ void main() {
     if (alpha <= bayer_threshold(uvec2(gl_FragCoord.xy))) discard;
 #endif
 
-    vec3 normal = gl_FrontFacing ? normal_depth.xyz : -normal_depth.xyz;
+    vec3 normal = normal_depth.xyz;
+#ifdef HAS_NORMAL_MAP
+    normal = mapped(normal);
+#endif
+    if (!gl_FrontFacing) normal = -normal;
     color_sample = vec4(srgb_from_linear(albedo.rgb), 1.0);
     surface_sample = vec4(toward_camera(normal) * 0.5 + 0.5, normal_depth.w);
 }

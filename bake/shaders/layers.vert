@@ -1,5 +1,6 @@
 #version 330
-// HAS_TEXTURE and HAS_COLOR are defined where the primitive has texture coordinates to use, or vertex colours.
+// HAS_TEXTURE, HAS_COLOR and HAS_NORMAL_MAP are defined where the primitive has texture coordinates to use, vertex
+// colours, or coordinates and tangents for a normal map.
 
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
@@ -10,6 +11,14 @@ out vec2 texture_uv;
 #ifdef HAS_COLOR
 layout(location = 3) in vec4 color;
 out vec4 vertex_color; // linear
+#endif
+
+#ifdef HAS_NORMAL_MAP
+layout(location = 4) in vec2 normal_uv;
+layout(location = 5) in vec4 tangent; // w: -1 where the picture is mirrored
+out vec2 map_uv;
+out vec3 map_tangent; // view space
+flat out float map_side;
 #endif
 
 uniform mat4 V;               // view from model
@@ -27,5 +36,10 @@ void main() {
 #endif
 #ifdef HAS_COLOR
     vertex_color = color;
+#endif
+#ifdef HAS_NORMAL_MAP
+    map_uv = normal_uv;
+    map_tangent = mat3(V) * tangent.xyz;
+    map_side = tangent.w;
 #endif
 }

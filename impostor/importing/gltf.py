@@ -118,6 +118,10 @@ class TextureInfo(_Object, kw_only=True):
     tex_coord: Index = 0
 
 
+class NormalTextureInfo(TextureInfo, kw_only=True):
+    scale: float = 1.0
+
+
 class _Pbr(_Object):
     base_color_factor: Vec4 = (1.0, 1.0, 1.0, 1.0)
     base_color_texture: TextureInfo | None = None
@@ -129,7 +133,7 @@ class _Pbr(_Object):
 class GltfMaterial(_Object):
     pbr_metallic_roughness: _Pbr = msgspec.field(default_factory=_Pbr)
     emissive_factor: Vec3 = (0.0, 0.0, 0.0)
-    normal_texture: Any = None
+    normal_texture: NormalTextureInfo | None = None
     occlusion_texture: Any = None
     alpha_mode: str = "OPAQUE"
     alpha_cutoff: float = 0.5

@@ -1,4 +1,4 @@
-"""Materials of a glTF file: base colour, alpha and the texture with its sampler; and what of them is not drawn."""
+"""Materials of a glTF file: base colour, alpha, normal map, textures with their samplers; and what is not drawn."""
 
 from __future__ import annotations
 
@@ -10,7 +10,16 @@ import msgspec
 import numpy as np
 
 from impostor.importing.gltf import Gltf, GltfMaterial, Primitive, TextureInfo, Vec2, floats
-from impostor.importing.materials import Material, decode_texture, finished, mirrored, read_texture, warn
+from impostor.importing.materials import (
+    Material,
+    NormalMap,
+    decode_texture,
+    finished,
+    mirrored,
+    read_normals,
+    read_texture,
+    warn,
+)
 
 _CLAMP, _MIRROR = 33071, 33648
 _BEYOND = 1e-3  # of a picture: exporters miss its edge by less
@@ -28,14 +37,46 @@ class _SpecularGlossiness(msgspec.Struct, rename="camel"):
     diffuse_texture: TextureInfo | None = None
 
 
+@dataclass(frozen=True)
+class _Sampling:
+    """How a texture is reached from the vertices."""
+
+    uv_set: int
+    transform: _Transform | None
+    wraps: tuple[int, int]
+
+    def laid(self, uvs: np.ndarray) -> tuple[_Layout, np.ndarray]:
+        """What coordinates ask of the picture, and they themselves as the picture is then sampled.
+
+        A sampler that mirrors is one that repeats a picture and its mirror image beside it; along an axis that the
+        coordinates do not leave it is one that clamps, texel by texel.
+        """
+        mirrors, clamps = (np.array(self.wraps) == kind for kind in (_MIRROR, _CLAMP))
+        if not (mirrors.any() and len(uvs)):
+            return _Layout(False, False, (bool(clamps[0]), bool(clamps[1]))), uvs
+        low, high = np.nanmin(uvs, axis=0), np.nanmax(uvs, axis=0)
+        leaves = (low < -_BEYOND) | (high > 1 + _BEYOND)
+        across, down = (bool(axis) for axis in leaves & mirrors)
+        clamp_u, clamp_v = (bool(axis) for axis in ~leaves & mirrors | clamps)
+        return _Layout(across, down, (clamp_u, clamp_v)), uvs * np.where([across, down], np.float32(0.5), np.float32(1))
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """A picture as its coordinates need it: with its mirror image right of it or below it, repeated or clamped."""
+
+    across: bool
+    down: bool
+    clamp: tuple[bool, bool]
+
+
 @dataclass(frozen=True, eq=False)
 class _Surface:
-    """A material and how its texture is reached from the vertices."""
+    """A material, and how its texture and its normal map are reached where it has them."""
 
     material: Material
-    uv_set: int = 0
-    transform: _Transform | None = None
-    mirrors: tuple[bool, bool] = (False, False)
+    color: _Sampling | None = None
+    normals: _Sampling | None = None
 
 
 class GltfMaterials:
@@ -46,30 +87,27 @@ class GltfMaterials:
         self._surfaces: dict[int | None, _Surface] = {
             None: _Surface(Material(base_color=(1.0, 1.0, 1.0, 1.0), double_sided=False))
         }
-        self._variants: dict[tuple[int, str], Material] = {}
+        self._variants: dict[tuple[int, str, _Layout | None], Material] = {}
         self._not_drawn: dict[str, list[str]] = {}
 
     def drawn(
         self, primitive: Primitive, attribute: Callable[[str], np.ndarray | None], place: str
-    ) -> tuple[Material, np.ndarray | None]:
-        """A primitive's material and its texture coordinates as the texture is to be sampled.
+    ) -> tuple[Material, np.ndarray | None, np.ndarray | None]:
+        """A primitive's material, and the coordinates at which its texture and its normal map are to be sampled.
 
         `attribute` gives the primitive's arrays by their names.
         """
         surface = self._surface(primitive.material)
-        material = surface.material
-        if material.texture is None:
-            return material, None
-        uvs = attribute(f"TEXCOORD_{surface.uv_set}")
-        if uvs is None:
-            warn(self._gltf.files, f"{place}: has no TEXCOORD_{surface.uv_set}, drawn without its texture")
-            return self._variant(material, "bare", lambda: replace(material, texture=None)), None
-        uvs = floats(uvs)
-        if surface.transform is not None:
-            uvs = _transformed(uvs, surface.transform)
-        if any(surface.mirrors) and len(uvs):
-            return self._mirrored(surface, uvs)
-        return material, uvs
+        material, found = surface.material, []
+        for kind, sampling in (("texture", surface.color), ("normal map", surface.normals)):
+            layout = uvs = None
+            if sampling is not None:
+                uvs = self._coordinates(sampling, attribute, place, kind)
+                if uvs is not None:
+                    layout, uvs = sampling.laid(uvs)
+                material = self._variant(material, kind, layout)
+            found.append(uvs)
+        return material, found[0], found[1]
 
     def tell_what_is_not_drawn(self) -> None:
         """A warning for each kind of thing that materials in use ask for in vain."""
@@ -77,29 +115,22 @@ class GltfMaterials:
             more = f" and {len(names) - 1} more" if len(names) > 1 else ""
             warn(self._gltf.files, f"material '{names[0]}'{more}: {kind} is not drawn")
 
-    def _mirrored(self, surface: _Surface, uvs: np.ndarray) -> tuple[Material, np.ndarray]:
-        """A sampler that mirrors, as one that repeats a picture and its mirror image beside it.
+    def _coordinates(
+        self, sampling: _Sampling, attribute: Callable[[str], np.ndarray | None], place: str, kind: str
+    ) -> np.ndarray | None:
+        """Texture coordinates (N, 2); None, with a warning, where the primitive has none."""
+        uvs = attribute(f"TEXCOORD_{sampling.uv_set}")
+        if uvs is None:
+            warn(self._gltf.files, f"{place}: has no TEXCOORD_{sampling.uv_set}, drawn without its {kind}")
+            return None
+        return floats(uvs) if sampling.transform is None else _transformed(floats(uvs), sampling.transform)
 
-        Along an axis that the coordinates do not leave it is one that clamps, texel by texel.
-        """
-        material = surface.material
-        low, high = np.nanmin(uvs, axis=0), np.nanmax(uvs, axis=0)
-        leaves = (low < -_BEYOND) | (high > 1 + _BEYOND)
-        across, down = (bool(axis) for axis in leaves & surface.mirrors)
-        clamp_u, clamp_v = (bool(axis) for axis in ~leaves & surface.mirrors | np.array(material.clamp))
-
-        def made() -> Material:
-            assert material.texture is not None
-            return replace(material, texture=mirrored(material.texture, across, down), clamp=(clamp_u, clamp_v))
-
-        scale = np.where([across, down], np.float32(0.5), np.float32(1))
-        return self._variant(material, f"mirrored {across} {down}", made), uvs * scale
-
-    def _variant(self, material: Material, kind: str, make: Callable[[], Material]) -> Material:
-        """One object for each way in which a material differs between primitives."""
-        if (id(material), kind) not in self._variants:
-            self._variants[id(material), kind] = make()
-        return self._variants[id(material), kind]
+    def _variant(self, material: Material, kind: str, layout: _Layout | None) -> Material:
+        """One object for each way in which a material differs between primitives; without the picture for no layout."""
+        key = id(material), kind, layout
+        if key not in self._variants:
+            self._variants[key] = _with_layout(material, kind, layout)
+        return self._variants[key]
 
     def _surface(self, index: int | None) -> _Surface:
         if index not in self._surfaces:
@@ -119,16 +150,18 @@ class GltfMaterials:
         material = Material(
             source.name or "default", factor, None, source.alpha_mode, source.alpha_cutoff, source.double_sided
         )
-        if info is None:
-            return _Surface(finished(self._gltf.files, material))
-        texture, wraps = self._texture(info, place)
-        material = replace(material, texture=texture, clamp=(wraps[0] == _CLAMP, wraps[1] == _CLAMP))
-        transform, uv_set = None, info.tex_coord
-        if "KHR_texture_transform" in info.extensions:
-            transform = self._extension(info, "KHR_texture_transform", _Transform, place)
-            uv_set = uv_set if transform.tex_coord is None else transform.tex_coord
-        mirrors = wraps[0] == _MIRROR, wraps[1] == _MIRROR
-        return _Surface(finished(self._gltf.files, material), uv_set, transform, mirrors)
+        color = normals = None
+        if info is not None:
+            texture = self._pixels(info, place)
+            material = replace(material, texture=texture)
+            color = None if texture is None else self._sampling(info, place)
+        info = source.normal_texture
+        if info is not None and "KHR_materials_unlit" not in source.extensions:
+            picture = read_normals(self._gltf.files, material.name, lambda: self._pixels(info, place))
+            if picture is not None:
+                material = replace(material, normal_map=NormalMap(picture, info.scale))
+                normals = self._sampling(info, place)
+        return _Surface(finished(self._gltf.files, material), color, normals)
 
     def _note_what_is_not_drawn(self, source: GltfMaterial) -> None:
         if "KHR_materials_unlit" in source.extensions:
@@ -138,7 +171,6 @@ class GltfMaterials:
         stated = pbr.metallic_factor > 0 and (pbr.metallic_factor, pbr.roughness_factor) != (1, 1)
         kinds = {
             "emission": any(source.emissive_factor),
-            "normal map": source.normal_texture is not None,
             "occlusion": source.occlusion_texture is not None,
             "metalness": pbr.metallic_roughness_texture is not None or stated,
         }
@@ -151,8 +183,18 @@ class GltfMaterials:
         except msgspec.ValidationError as error:
             raise self._gltf.fail(f"{place}: {name}: {error}") from error
 
-    def _texture(self, info: TextureInfo, place: str) -> tuple[np.ndarray | None, tuple[int, int]]:
-        """Pixels, and how the sampler wraps them along u and v."""
+    def _sampling(self, info: TextureInfo, place: str) -> _Sampling:
+        transform, uv_set, wraps = None, info.tex_coord, (0, 0)
+        if "KHR_texture_transform" in info.extensions:
+            transform = self._extension(info, "KHR_texture_transform", _Transform, place)
+            uv_set = uv_set if transform.tex_coord is None else transform.tex_coord
+        sampler = self._gltf.item("textures", info.index, place).sampler
+        if sampler is not None:
+            found = self._gltf.item("samplers", sampler, f"textures[{info.index}]")
+            wraps = found.wrap_s, found.wrap_t
+        return _Sampling(uv_set, transform, wraps)
+
+    def _pixels(self, info: TextureInfo, place: str) -> np.ndarray | None:
         texture = self._gltf.item("textures", info.index, place)
         source = texture.extensions.get("EXT_texture_webp", {}).get("source", texture.source)
         if source is None:
@@ -160,14 +202,21 @@ class GltfMaterials:
             raise self._gltf.fail(
                 f"{place}: textures[{info.index}] has only {names}; expected a PNG, JPEG or WebP image"
             )
-        wraps = 0, 0
-        if texture.sampler is not None:
-            sampler = self._gltf.item("samplers", texture.sampler, f"textures[{info.index}]")
-            wraps = sampler.wrap_s, sampler.wrap_t
         content, image_place = self._gltf.image(source, f"textures[{info.index}]")
         if isinstance(content, str):
-            return read_texture(self._gltf.files, content, image_place, self._allow_missing_textures), wraps
-        return decode_texture(self._gltf.files, content, image_place), wraps
+            return read_texture(self._gltf.files, content, image_place, self._allow_missing_textures)
+        return decode_texture(self._gltf.files, content, image_place)
+
+
+def _with_layout(material: Material, kind: str, layout: _Layout | None) -> Material:
+    if kind == "texture":
+        if material.texture is None or layout is None:
+            return replace(material, texture=None)
+        return replace(material, texture=mirrored(material.texture, layout.across, layout.down), clamp=layout.clamp)
+    if material.normal_map is None or layout is None:
+        return replace(material, normal_map=None)
+    picture = mirrored(material.normal_map.picture, layout.across, layout.down)
+    return replace(material, normal_map=replace(material.normal_map, picture=picture, clamp=layout.clamp))
 
 
 def _transformed(uvs: np.ndarray, transform: _Transform) -> np.ndarray:

@@ -156,7 +156,10 @@ class _SceneReader:
             normals = self._morphed(normals, "NORMAL", primitive, weights, place)
         if skin is not None:
             positions, normals = self._skinned(positions, normals, attribute, skin, place)
-        material, uvs = self.materials.drawn(primitive, attribute, place)
+        material, uvs, normal_uvs = self.materials.drawn(primitive, attribute, place)
+        # In another pose than the file's own, tangents are worked out like those of a file that has none.
+        own = material.normal_map is not None and normals is not None and skin is None and not any(weights)
+        tangents = attribute("TANGENT") if own else None
         triangles = self._triangles(primitive, draco, len(positions), place)
         colors = attribute("COLOR_0")
         return Part(
@@ -169,6 +172,8 @@ class _SceneReader:
             None,
             material,
             worlds,
+            normal_uvs,
+            None if tangents is None else floats(tangents),
         )
 
     def _triangles(self, primitive: Primitive, draco: dict[str, np.ndarray], count: int, place: str) -> np.ndarray:

@@ -5,17 +5,19 @@ from __future__ import annotations
 import io
 import itertools
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from PIL import Image
 from scipy.ndimage import distance_transform_edt
 
-from impostor.errors import ModelError, ModelWarning
+from impostor.errors import ModelError, ModelWarning, SettingsError
 from impostor.importing.sources import ModelFiles, utf8
 from impostor.srgb import linear_from_srgb
 
 LARGEST_TEXTURE = 16384
+LEAST_BLUE = 128  # of a normal map: less would face into the surface
 _KTX2_MAGIC = b"\xabKTX 20\xbb"
 _ALPHA_IS_OPAQUE = 250
 _BINARY_SHARE = 0.2
@@ -26,8 +28,34 @@ _MTL_OPTION_VALUES = {
 
 
 @dataclass(frozen=True, eq=False)
+class NormalMap:
+    """A picture of normals, laid on a surface along its tangents.
+
+    Attributes
+    ----------
+    picture : ndarray, (H, W, 3) uint8
+        Right, up and out of the picture, 128 for 0 and 255 for 1; row 0 is the top.
+    scale : float
+        Of what leans right and up; below 0 what is raised is hollow.
+    clamp : tuple of bool
+        As a material's.
+    """
+
+    picture: np.ndarray
+    scale: float = 1.0
+    clamp: tuple[bool, bool] = (False, False)
+
+    def __post_init__(self):
+        found = getattr(self.picture, "shape", type(self.picture).__name__), getattr(self.picture, "dtype", "")
+        if found[1] != np.uint8 or len(found[0]) != 3 or found[0][2] != 3 or not self.picture.size:
+            raise SettingsError("normal map", f"a picture of {found[0]} {found[1]}; expected (H, W, 3) uint8")
+        if not np.isfinite(self.scale):
+            raise SettingsError("normal map", f"scale {self.scale}; expected a finite number")
+
+
+@dataclass(frozen=True, eq=False)
 class Material:
-    """The colour of a surface before any light falls on it.
+    """The surface of a model: its colour before any light falls on it, and how its normals lean.
 
     Attributes
     ----------
@@ -42,6 +70,7 @@ class Material:
     double_sided : bool
     clamp : tuple of bool
         Whether the picture's edge goes on beyond it along u and along v; else the picture repeats.
+    normal_map : NormalMap, optional
     """
 
     name: str = "default"
@@ -51,6 +80,7 @@ class Material:
     alpha_cutoff: float = 0.5
     double_sided: bool = True
     clamp: tuple[bool, bool] = (False, False)
+    normal_map: NormalMap | None = None
 
 
 def warn(files: ModelFiles, problem: str) -> None:
@@ -68,6 +98,25 @@ def read_texture(files: ModelFiles, reference: str, place: str, allow_missing: b
         warn(files, f"{error.problem}; drawn without it")
         return None
     return decode_texture(files, data, f"{place}: '{reference[:80]}'")
+
+
+def read_normals(files: ModelFiles, name: str, read: Callable[[], np.ndarray | None]) -> np.ndarray | None:
+    """Pixels (H, W, 3) of a normal map; None, with a warning, where it cannot be used: the object is whole without.
+
+    Texels that no surface shows often hold no normal: they get that of the nearest that does.
+    """
+    try:
+        found = read()
+    except ModelError as error:
+        warn(files, f"{error.problem}; drawn without it")
+        return None
+    if found is None:
+        return None
+    empty = found[..., 2] < LEAST_BLUE
+    if empty.all():
+        warn(files, f"normal map of material '{name}': blue is below {LEAST_BLUE} everywhere; drawn without it")
+        return None
+    return np.ascontiguousarray(_filled(found[..., :3], empty) if empty.any() else found[..., :3])
 
 
 def decode_texture(files: ModelFiles, data: bytes, place: str) -> np.ndarray:
@@ -150,7 +199,12 @@ def fill_clear_texels(texture: np.ndarray) -> np.ndarray:
     clear = texture[..., 3] == 0
     if not clear.any() or clear.all():
         return texture
-    rows, columns = distance_transform_edt(clear, return_distances=False, return_indices=True)  # type: ignore[misc]
+    return _filled(texture, clear)
+
+
+def _filled(texture: np.ndarray, empty: np.ndarray) -> np.ndarray:
+    """A picture with the colour of the nearest other texel in those that are empty."""
+    rows, columns = distance_transform_edt(empty, return_distances=False, return_indices=True)  # type: ignore[misc]
     filled = texture.copy()
     filled[..., :3] = texture[rows, columns, :3]
     return filled
@@ -163,7 +217,7 @@ def mirrored(texture: np.ndarray, across: bool, down: bool) -> np.ndarray:
 
 
 def read_mtl(files: ModelFiles, reference: str, allow_missing: bool) -> dict[str, Material]:
-    """Materials of an MTL file by name: Kd, d or Tr, map_Kd, map_d.
+    """Materials of an MTL file by name: Kd, d or Tr, map_Kd, map_d, norm or map_Kn.
 
     Kd is taken as an sRGB value, the way it looks on screen.
     """
@@ -177,6 +231,10 @@ def read_mtl(files: ModelFiles, reference: str, allow_missing: bool) -> dict[str
             current = statements.setdefault(" ".join(value.split()), {})
         elif value:
             current[key.lower()] = value.strip()
+    rough = [name for name, lines in statements.items() if lines.keys() & {"bump", "map_bump"}]
+    if rough:
+        more = f" and {len(rough) - 1} more" if len(rough) > 1 else ""
+        warn(files, f"material '{rough[0]}'{more}: height map (bump) is not drawn")
     return {name: _mtl_material(files, name, lines, allow_missing) for name, lines in statements.items()}
 
 
@@ -188,7 +246,18 @@ def _mtl_material(files: ModelFiles, name: str, lines: dict[str, str], allow_mis
     base_color = (red, green, blue, _mtl_opacity(files, place, lines))
     texture = _mtl_texture(files, place, lines, allow_missing)
     clamp = "map_kd" in lines and _mtl_clamps(lines["map_kd"])
-    return finished(files, with_alpha_mode(Material(name, base_color, texture, clamp=(clamp, clamp))))
+    normals = _mtl_normals(files, name, lines, allow_missing)
+    material = Material(name, base_color, texture, clamp=(clamp, clamp), normal_map=normals)
+    return finished(files, with_alpha_mode(material))
+
+
+def _mtl_normals(files: ModelFiles, name: str, lines: dict[str, str], allow_missing: bool) -> NormalMap | None:
+    key = next((key for key in ("norm", "map_kn") if key in lines), None)
+    if key is None:
+        return None
+    reference, place, clamp = _mtl_reference(lines[key]), f"material '{name}': {key}", _mtl_clamps(lines[key])
+    picture = read_normals(files, name, lambda: read_texture(files, reference, place, allow_missing))
+    return None if picture is None else NormalMap(picture, clamp=(clamp, clamp))
 
 
 def _mtl_opacity(files: ModelFiles, place: str, lines: dict[str, str]) -> float:

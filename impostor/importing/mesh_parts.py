@@ -72,6 +72,9 @@ def imported_parts(files: ModelFiles, source: Prepared, loader: Callable, allow_
             problem = obj_index_problem(source.data) if materials is not None else None
             warn(files, f"{part.place}: texture not drawn, {problem or 'faces lack texture coordinates'}")
             part.material = replace(part.material, texture=None)
+        if part.normal_uvs is None and part.material.normal_map is not None:
+            warn(files, f"{part.place}: normal map not drawn, faces lack texture coordinates")
+            part.material = replace(part.material, normal_map=None)
     return parts
 
 
@@ -182,16 +185,19 @@ class _Converter:
         colors = None if face_colors is not None or colors is None or len(colors) != len(positions) else colors
         visual = mesh.get("visual")
         material = self._material(visual, colors is not None or face_colors is not None)
+        drawn = material.texture is not None or material.normal_map is not None
+        uvs = _uvs(visual, len(positions)) if drawn else None
         return Part(
             f"mesh '{name}'",
             positions,
             triangles,
             _matching(mesh.get("vertex_normals"), positions),
-            _uvs(visual, len(positions)) if material.texture is not None else None,
+            uvs if material.texture is not None else None,
             self._without_alpha(colors),
             self._without_alpha(face_colors),
             material,
             worlds,
+            normal_uvs=uvs if material.normal_map is not None else None,
         )
 
     def _without_alpha(self, colors: np.ndarray | None) -> np.ndarray | None:

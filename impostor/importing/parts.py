@@ -10,6 +10,7 @@ from impostor.errors import ModelError
 from impostor.importing.distance import Distance
 from impostor.importing.materials import Material
 from impostor.importing.normals import agreeing_winding, computed_normals, face_vectors, repaired_normals, weld
+from impostor.importing.tangents import picture_tangents, repaired_tangents
 
 MOST_TRIANGLES = 100_000_000
 LARGEST_COORDINATE = 1e18
@@ -34,6 +35,10 @@ class Part:
     material : Material
     worlds : list of ndarray, (4, 4) float64
         `world_from_part`, one for each instance.
+    normal_uvs : ndarray, (N, 2) float, or None
+        As `uvs`, of the material's normal map.
+    tangents : ndarray, (N, 4) float, or None
+        See `picture_tangents`.
     """
 
     place: str
@@ -45,6 +50,8 @@ class Part:
     face_colors: np.ndarray | None = None
     material: Material = field(default_factory=Material)
     worlds: list[np.ndarray] = field(default_factory=lambda: [np.eye(4)])
+    normal_uvs: np.ndarray | None = None
+    tangents: np.ndarray | None = None
 
 
 def checked(where, part: Part) -> Part:
@@ -62,7 +69,7 @@ def checked(where, part: Part) -> Part:
         raise ModelError(where, f"{part.place}: positions have shape {part.positions.shape}; expected (N, 3)")
     if part.triangles.ndim != 2 or part.triangles.shape[1] != 3:
         raise ModelError(where, f"{part.place}: triangles have shape {part.triangles.shape}; expected (M, 3)")
-    for name, width in (("normals", 3), ("uvs", 2), ("colors", 4)):
+    for name, width in (("normals", 3), ("uvs", 2), ("colors", 4), ("normal_uvs", 2), ("tangents", 4)):
         array = getattr(part, name)
         if array is not None and array.shape != (count, width):
             raise ModelError(where, f"{part.place}: {name} have shape {array.shape}; expected {(count, width)}")
@@ -83,7 +90,7 @@ def _check_indices(where, part: Part, count: int) -> None:
 
 
 def _check_finite(where, part: Part) -> None:
-    for name in ("positions", "uvs"):
+    for name in ("positions", "uvs", "normal_uvs"):
         array = getattr(part, name)
         if array is None or np.isfinite(array).all():
             continue
@@ -97,6 +104,8 @@ def _check_finite(where, part: Part) -> None:
 
 def finished_part(where, part: Part, distance: Distance, crease: float, welded: bool = True) -> Part | None:
     """A checked part in world space: instances expanded, degenerate triangles dropped, normals unit and agreeing.
+
+    With a normal map come tangents for it.
 
     Its positions have 32 bits where it is not far from the origin, and 64 bits else.
 
@@ -133,9 +142,21 @@ def finished_part(where, part: Part, distance: Distance, crease: float, welded: 
         part.colors = np.repeat(part.face_colors, 3, axis=0)
         part.triangles = np.arange(part.triangles.size).reshape(-1, 3)
     _drop_unused(part)
+    if part.normal_uvs is not None:
+        _lay_normal_map(part)
     if far:
         part.positions = part.positions + distance.origin
     return part
+
+
+def _lay_normal_map(part: Part) -> None:
+    assert part.normals is not None and part.normal_uvs is not None
+    if part.tangents is not None:
+        part.tangents = repaired_tangents(part.tangents, part.normals)
+        return
+    tangents, part.triangles, source = picture_tangents(part.positions, part.normals, part.normal_uvs, part.triangles)
+    _take(part, source)
+    part.tangents = tangents
 
 
 def joined(parts: list[Part]) -> Part:
@@ -147,6 +168,7 @@ def joined(parts: list[Part]) -> Part:
     triangles = [part.triangles + offset for part, offset in zip(parts, offsets, strict=True)]
     has_colors = any(part.colors is not None for part in parts)
     has_uvs = all(part.uvs is not None for part in parts)
+    has_map = all(part.tangents is not None for part in parts)
     white = [np.full((len(part.positions), 4), 255, np.uint8) if part.colors is None else part.colors for part in parts]
     return Part(
         parts[0].place,
@@ -157,6 +179,10 @@ def joined(parts: list[Part]) -> Part:
         np.concatenate(white) if has_colors else None,
         None,
         material,
+        normal_uvs=np.concatenate([part.normal_uvs for part in parts if part.normal_uvs is not None])
+        if has_map
+        else None,
+        tangents=np.concatenate([part.tangents for part in parts if part.tangents is not None]) if has_map else None,
     )
 
 
@@ -182,6 +208,9 @@ def _expanded(where, part: Part, origin: np.ndarray) -> Part:
     normals = part.normals
     if normals is not None and positions is not part.positions:
         normals = np.concatenate([normals @ normal_matrix(world[:3, :3]).T for world in worlds])
+    tangents = part.tangents
+    if tangents is not None and positions is not part.positions:
+        tangents = np.concatenate([_turned_tangents(tangents, world[:3, :3]) for world in worlds])
     triangles = [_wound(part.triangles, world) + index * count for index, world in enumerate(worlds)]
     return Part(
         part.place,
@@ -192,6 +221,8 @@ def _expanded(where, part: Part, origin: np.ndarray) -> Part:
         _tiled(part.colors, instances),
         _tiled(part.face_colors, instances),
         part.material,
+        normal_uvs=_tiled(part.normal_uvs, instances),
+        tangents=tangents,
     )
 
 
@@ -203,13 +234,19 @@ def _wound(triangles: np.ndarray, world: np.ndarray) -> np.ndarray:
     return triangles[:, ::-1] if np.linalg.det(world[:3, :3]) < 0 else triangles
 
 
+def _turned_tangents(tangents: np.ndarray, linear: np.ndarray) -> np.ndarray:
+    """Tangents lie in the surface and turn with it; what mirrors it mirrors the picture."""
+    return np.column_stack([tangents[:, :3] @ linear.T, tangents[:, 3] * np.sign(np.linalg.det(linear))])
+
+
 def _tiled(array: np.ndarray | None, instances: int) -> np.ndarray | None:
     return array if array is None or instances == 1 else np.tile(array, (instances, 1))
 
 
 def _is_soup(part: Part) -> bool:
     """Whether no two triangles share a vertex and vertices hold positions alone, as in STL."""
-    plain = all(array is None for array in (part.normals, part.uvs, part.colors, part.face_colors))
+    beside = part.normals, part.uvs, part.colors, part.face_colors, part.normal_uvs
+    plain = all(array is None for array in beside)
     return plain and 0 < len(part.positions) == part.triangles.size
 
 
@@ -230,7 +267,7 @@ def _drop_unused(part: Part) -> None:
 
 
 def _take(part: Part, source: np.ndarray) -> None:
-    for name in ("positions", "normals", "uvs", "colors"):
+    for name in ("positions", "normals", "uvs", "colors", "normal_uvs", "tangents"):
         array = getattr(part, name)
         if array is not None:
             setattr(part, name, array[source])

@@ -1,4 +1,4 @@
-"""Bumps: a picture of slopes on a polygon mesh, and the tangents that say which way it lies."""
+"""Bumps and normal maps: pictures of how normals lean on a polygon mesh, and the tangents that say which way."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impostor.errors import SettingsError
-from impostor.model import Model, Primitive
+from impostor.model import Model, NormalMap, Primitive
+from impostor.normal_map import FLAT
 from runtime.checks import check_number
 from runtime.gl.uploads import check_texture_size
 from runtime.meshes.tangents import tangent_mesh
@@ -17,7 +18,7 @@ from runtime.meshes.tangents import tangent_mesh
 
 @dataclass(frozen=True, eq=False)
 class Bump:
-    """A picture of slopes.
+    """A picture of slopes, in the place of a model's own normal maps.
 
     The normal becomes `n + bumpiness * (x * tangent + y * binormal)`, where x and y are red and green as 0 to 1, less
     128 / 255: the byte 128 is flat.
@@ -54,24 +55,41 @@ class Bump:
         check_number("bump", "bumpiness", self.bumpiness)
 
 
-def bump_texture(ctx: moderngl.Context, bump: Bump) -> moderngl.Texture:
-    """The picture on the GPU, repeating, with mip levels.
+class BumpTexture:
+    """The picture of bumps or of a normal map on the GPU, with mip levels, and how it is read.
+
+    Attributes
+    ----------
+    weights : tuple of float
+        Of red, green and blue, less the byte that is flat, along tangent, binormal and normal; and of the surface's
+        own normal beside them.
 
     Raises
     ------
     GpuError
         The GPU cannot hold a picture of that size.
     """
-    height, width = bump.picture.shape[:2]
-    check_texture_size(ctx, "bump", width, height)
-    texture = ctx.texture((width, height), 3, np.ascontiguousarray(bump.picture).tobytes(), alignment=1)
-    texture.build_mipmaps()
-    texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-    return texture
+
+    def __init__(self, ctx: moderngl.Context, source: Bump | NormalMap):
+        height, width = source.picture.shape[:2]
+        if isinstance(source, Bump):
+            name, clamp, self.weights = "bump", (False, False), (source.bumpiness, source.bumpiness, 0.0, 1.0)
+        else:
+            name, clamp, unit = "normal map", source.clamp, 255 / (255 - FLAT)
+            self.weights = (source.scale * unit, source.scale * unit, unit, 0.0)
+        check_texture_size(ctx, name, width, height)
+        self.texture = ctx.texture((width, height), 3, np.ascontiguousarray(source.picture).tobytes(), alignment=1)
+        self.texture.repeat_x, self.texture.repeat_y = (not axis for axis in clamp)
+        self.texture.build_mipmaps()
+        self.texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+
+    def release(self) -> None:
+        """Free the texture."""
+        self.texture.release()
 
 
-def with_tangents(name: str, primitive: Primitive) -> tuple[Primitive, NDArray[np.float32]]:
-    """A part of a model whose vertices are split where the picture is mirrored, and their tangents, (N, 4) float32.
+def with_tangents(name: str, primitive: Primitive) -> Primitive:
+    """A part of a model as if its texture were a normal map: with tangents, vertices split where it is mirrored.
 
     Raises
     ------
@@ -83,12 +101,13 @@ def with_tangents(name: str, primitive: Primitive) -> tuple[Primitive, NDArray[n
     mesh = tangent_mesh(Model(name, (primitive,)))
     source = np.zeros(len(mesh.positions), np.intp)
     source[mesh.triangles] = primitive.triangles
-    split = replace(
+    return replace(
         primitive,
         positions=mesh.positions,
         normals=mesh.normals,
         uvs=mesh.uvs,
         colors=None if primitive.colors is None else primitive.colors[source],
         triangles=mesh.triangles,
+        normal_uvs=mesh.uvs,
+        tangents=mesh.tangents,
     )
-    return split, mesh.tangents

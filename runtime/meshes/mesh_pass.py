@@ -18,7 +18,7 @@ from runtime.gl.state import CallerState, set_state
 from runtime.gl.uploads import SRGB8_ALPHA8, InstanceBuffer, check_texture_size
 from runtime.instances.dither import WHOLE
 from runtime.lights.light_table import LightTable
-from runtime.meshes.bump import Bump, bump_texture, with_tangents
+from runtime.meshes.bump import Bump, BumpTexture, with_tangents
 from runtime.rooms.environments import RoomTable
 from runtime.viewing.viewer import Viewer
 
@@ -35,15 +35,15 @@ PROGRAMS = (
 )
 LIGHTS_UNIT, BUMP_UNIT, ROOMS_UNIT = 1, 2, 3  # texture units beside the base texture's
 VERTEX_DTYPE = np.dtype([("position", "f4", (3,)), ("normal", "f4", (3,)), ("uv", "f4", (2,)), ("tint", "u1", (4,))])
-BUMPED_DTYPE = np.dtype([*VERTEX_DTYPE.descr, ("tangent", "f4", (4,))])
+BUMPED_DTYPE = np.dtype([*VERTEX_DTYPE.descr, ("tangent", "f4", (4,)), ("bump_uv", "f4", (2,))])
 VERTEX_FORMATS = {"position": ("3f", "12x"), "normal": ("3f", "12x"), "uv": ("2f", "8x"), "tint": ("4f1", "4x")}
-BUMPED_FORMATS = {**VERTEX_FORMATS, "tangent": ("4f", "16x")}
+BUMPED_FORMATS = {**VERTEX_FORMATS, "tangent": ("4f", "16x"), "bump_uv": ("2f", "8x")}
 COPY_DTYPE = np.dtype([("row_0", "f4", (4,)), ("row_1", "f4", (4,)), ("row_2", "f4", (4,)), ("part", "f4", (2,))])
 COPY_FORMATS = {"row_0": ("4f", "16x"), "row_1": ("4f", "16x"), "row_2": ("4f", "16x"), "part": ("2f", "8x")}
 
 
 class MeshPart:
-    """One primitive on the GPU, with tangents (N, 4) where it has them: its buffers and its texture.
+    """One primitive on the GPU: its buffers, its texture and its bumps, which are the model's or else its normal map.
 
     Its positions are those of the primitive less `origin`.
     """
@@ -54,12 +54,15 @@ class MeshPart:
         primitive: Primitive,
         origin: NDArray[np.float64],
         white: moderngl.Texture,
-        tangents: NDArray[np.float32] | None = None,
+        bumps: BumpTexture | None = None,
     ):
         self.material: Material = primitive.material
-        vertices = np.zeros(len(primitive.positions), VERTEX_DTYPE if tangents is None else BUMPED_DTYPE)
-        if tangents is not None:
-            vertices["tangent"] = tangents
+        self.bumps, self._own_bumps = bumps, None
+        if bumps is None and self.material.normal_map is not None and primitive.tangents is not None:
+            self.bumps = self._own_bumps = BumpTexture(ctx, self.material.normal_map)
+        vertices = np.zeros(len(primitive.positions), VERTEX_DTYPE if self.bumps is None else BUMPED_DTYPE)
+        if self.bumps is not None:
+            vertices["tangent"], vertices["bump_uv"] = primitive.tangents, primitive.normal_uvs
         vertices["position"], vertices["normal"] = primitive.positions - origin, primitive.normals
         vertices["uv"] = 0 if primitive.uvs is None else primitive.uvs
         vertices["tint"] = 255 if primitive.colors is None else primitive.colors
@@ -76,8 +79,8 @@ class MeshPart:
             self.texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
 
     def release(self) -> None:
-        """Free the buffers and the texture."""
-        for resource in (self.vertices, self.indices, self._own):
+        """Free the buffers and the textures."""
+        for resource in (self.vertices, self.indices, self._own, self._own_bumps):
             if resource is not None:
                 resource.release()
 
@@ -107,15 +110,19 @@ class MeshBuffers:
 
     def __init__(self, ctx: moderngl.Context, model: Model, bump: Bump | None = None):
         self.model, self.bump = model, bump
-        parts = model.primitives
-        prepared = [(part, None) if bump is None else with_tangents(model.name, part) for part in parts]
+        parts = [part if bump is None else with_tangents(model.name, part) for part in model.primitives]
         far = any(part.positions.dtype == np.float64 for part in parts)
         self.origin = model.bounds.mean(axis=0) if far else np.zeros(3)
-        self.bumps = None if bump is None else bump_texture(ctx, bump)
+        self._bumps = None if bump is None else BumpTexture(ctx, bump)
         self._white = ctx.texture((1, 1), 4, b"\xff\xff\xff\xff")
-        self.parts = [MeshPart(ctx, part, self.origin, self._white, tangents) for part, tangents in prepared]
+        self.parts = [MeshPart(ctx, part, self.origin, self._white, self._bumps) for part in parts]
         self._arrays: dict[tuple[int, int | None], list[moderngl.VertexArray]] = {}
         self.triangle_count = model.triangle_count
+
+    @property
+    def bumped(self) -> bool:
+        """Whether any part has bumps or a normal map."""
+        return any(part.bumps is not None for part in self.parts)
 
     def vertex_arrays(
         self, ctx: moderngl.Context, program: moderngl.Program, copies: InstanceBuffer | None = None
@@ -126,11 +133,12 @@ class MeshBuffers:
         """
         key = program.glo, copies and copies.buffer.glo
         if key not in self._arrays:
-            vertices = _layout(program, VERTEX_FORMATS if self.bump is None else BUMPED_FORMATS)
             records = [] if copies is None else [(copies.buffer, *_layout(program, COPY_FORMATS, "/i"))]
-            self._arrays[key] = [
-                ctx.vertex_array(program, [(part.vertices, *vertices), *records], part.indices) for part in self.parts
-            ]
+            self._arrays[key] = []
+            for part in self.parts:
+                vertices = _layout(program, VERTEX_FORMATS if part.bumps is None else BUMPED_FORMATS)
+                array = ctx.vertex_array(program, [(part.vertices, *vertices), *records], part.indices)
+                self._arrays[key].append(array)
         return self._arrays[key]
 
     def release(self) -> None:
@@ -141,8 +149,8 @@ class MeshBuffers:
         for part in self.parts:
             part.release()
         self._white.release()
-        if self.bumps is not None:
-            self.bumps.release()
+        if self._bumps is not None:
+            self._bumps.release()
 
 
 @dataclass
@@ -315,8 +323,9 @@ class MeshPass:
     def _draw_group(self, program: moderngl.Program, group: MeshCopies) -> None:
         count = len(group.world_from_model)
         set_uniforms(program, gloss=(group.gloss.strength, group.gloss.shininess))
-        if "bumps" in program:
-            _set_bumps(program, group.buffers)
+        if "plain_fresnel" in program:
+            bump = group.buffers.bump
+            set_uniforms(program, plain_fresnel=bump is not None and bump.plain_fresnel)
         if "mirrors" in program:
             _set_reflection(program, group.reflection)
         self._copies.write(group.records())
@@ -334,7 +343,7 @@ def _parts(group: MeshCopies, rooms: RoomTable | None) -> list[tuple[str, int, M
     """Copies by the cheapest program that draws them and the first room that it reads."""
     if not len(group.world_from_model):
         return []
-    bumped = group.buffers.bump is not None
+    bumped = group.buffers.bumped
     if rooms is None or not len(rooms):
         return [("mesh_bump" if bumped else "mesh" if group.parts is None else "mesh_fading", 0, group)]
     suffix = "_mirrored" if bumped or group.reflection is not None else ""
@@ -347,15 +356,11 @@ def _parts(group: MeshCopies, rooms: RoomTable | None) -> list[tuple[str, int, M
     ]
 
 
-def _set_bumps(program: moderngl.Program, buffers: MeshBuffers) -> None:
-    bump = buffers.bump
-    set_uniforms(program, bump_picture=BUMP_UNIT, bumps=bump is not None)
-    if bump is None or buffers.bumps is None:
-        return
-    buffers.bumps.use(BUMP_UNIT)
-    set_uniforms(program, bumpiness=bump.bumpiness)
-    if "plain_fresnel" in program:
-        set_uniforms(program, plain_fresnel=bump.plain_fresnel)
+def _set_bumps(program: moderngl.Program, bumps: BumpTexture | None) -> None:
+    set_uniforms(program, bump_picture=BUMP_UNIT, bumps=bumps is not None)
+    if bumps is not None:
+        bumps.texture.use(BUMP_UNIT)
+        set_uniforms(program, bump_weights=bumps.weights)
 
 
 def _set_reflection(program: moderngl.Program, reflection: Reflection | None) -> None:
@@ -387,6 +392,8 @@ def draw_parts(
             "alpha_threshold": part.material.alpha_cutoff,
         }
         set_uniforms(program, **{name: value for name, value in surface.items() if name in program})
+        if "bumps" in program:
+            _set_bumps(program, part.bumps)
         array.render(moderngl.TRIANGLES, instances=count)
 
 

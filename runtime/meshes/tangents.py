@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impostor.errors import SettingsError
+from impostor.importing.tangents import picture_tangents
 from impostor.model import Model, Primitive
 
 SAME = 1e-4  # largest difference between two unit vectors that count as one
@@ -72,46 +73,16 @@ def tangent_mesh(model: Model) -> TangentMesh:
 def _part(name: str, primitive: Primitive) -> TangentMesh:
     if primitive.uvs is None:
         raise SettingsError(name, "no texture coordinates; expected a mesh with them, to lay a PTM on")
-    triangles = primitive.triangles.astype(np.int64)
-    tangent, up = _gradients(primitive.positions[triangles].astype(float), primitive.uvs[triangles].astype(float))
-    edges = primitive.positions[triangles[:, 1:]].astype(float) - primitive.positions[triangles[:, :1]]
-    facing = np.cross(edges[:, 0], edges[:, 1])
-    mirrored = np.einsum("mi,mi->m", np.cross(facing, tangent), up) < 0
-    # Twice as many vertices as there are, then those that some triangle uses.
-    used, corners = np.unique(2 * triangles + mirrored[:, None], return_inverse=True)
-    vertex, corners = used // 2, corners.reshape(-1, 3)
-    normals = primitive.normals[vertex].astype(float)
-    across = tangent[:, None] - np.einsum("mi,mki->mk", tangent, normals[corners])[..., None] * normals[corners]
-    across = _unit(across) * _angles(primitive.positions[triangles].astype(float))[..., None]
-    sums = np.stack([np.bincount(corners.ravel(), across[..., i].ravel(), len(used)) for i in range(3)], axis=-1)
-    sums -= np.einsum("ni,ni->n", sums, normals)[:, None] * normals
-    lost = np.linalg.norm(sums, axis=1) < 1e-9
-    sums[lost] = np.cross(normals[lost], np.eye(3)[np.abs(normals[lost]).argmin(axis=1)])
+    found = picture_tangents(primitive.positions, primitive.normals, primitive.uvs, primitive.triangles)
+    tangents, triangles, vertex = found
+    normals = primitive.normals[vertex]
+    lost = ~tangents[:, :3].any(axis=1)
+    sides = np.cross(normals[lost], np.eye(3)[np.abs(normals[lost]).argmin(axis=1)])
+    tangents[lost, :3] = sides / np.linalg.norm(sides, axis=1, keepdims=True)
     return TangentMesh(
         primitive.positions[vertex],
-        primitive.normals[vertex],
-        np.hstack([_unit(sums), 1.0 - 2.0 * (used % 2)[:, None]]).astype(np.float32),
+        normals,
+        tangents,
         primitive.uvs[vertex],
-        corners.astype(np.uint32),
+        triangles.astype(np.uint32),
     )
-
-
-def _gradients(points: NDArray[np.float64], uvs: NDArray[np.float64]):
-    """Directions (M, 3) in which u grows and v falls, unit; zero where a triangle has no area in the picture."""
-    (du1, dv1), (du2, dv2) = np.moveaxis(uvs[:, 1:] - uvs[:, :1], 0, -1)
-    edge1, edge2 = np.moveaxis(points[:, 1:] - points[:, :1], 1, 0)
-    turn = np.sign(du1 * dv2 - du2 * dv1)[:, None]
-    along_u = turn * (edge1 * dv2[:, None] - edge2 * dv1[:, None])
-    along_v = turn * (edge2 * du1[:, None] - edge1 * du2[:, None])
-    return _unit(along_u), _unit(-along_v)
-
-
-def _angles(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Angles (M, 3) at the corners of triangles (M, 3, 3)."""
-    after = _unit(np.roll(points, -1, axis=1) - points)
-    before = _unit(np.roll(points, 1, axis=1) - points)
-    return np.arccos(np.clip(np.einsum("mki,mki->mk", after, before), -1, 1))
-
-
-def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-30)
