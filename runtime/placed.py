@@ -13,8 +13,9 @@ from runtime.fans.lod import LevelOfDetail, Levels
 from runtime.fans.textures import FanTextures
 from runtime.gl.state import preserved_state
 from runtime.instances.instances import Instances
+from runtime.meshes.buffers import MeshBuffers
 from runtime.meshes.bump import Bump
-from runtime.meshes.mesh_pass import MeshBuffers, MeshInstance
+from runtime.meshes.copies import MeshInstance
 from runtime.surfaces.surface_pass import Surface
 
 

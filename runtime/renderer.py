@@ -30,7 +30,8 @@ from runtime.instances.instances import Instances
 from runtime.lights.light_table import LightTable, check_lights
 from runtime.lights.settings import LightSettings
 from runtime.meshes.bump import Bump
-from runtime.meshes.mesh_pass import OUTPUTS, MeshInstance, MeshPass, check_meshes
+from runtime.meshes.copies import MeshInstance, check_meshes
+from runtime.meshes.mesh_pass import OUTPUTS, MeshPass
 from runtime.placed import Placed
 from runtime.rooms.environments import RoomTable, check_rooms
 from runtime.rooms.room_pass import RoomPass, number_of, to_show

@@ -15,7 +15,8 @@ from impostor.views import rotation_about_y
 from runtime.instances.dither import WHOLE, rest_of
 from runtime.instances.instances import Instances
 from runtime.instances.placement import Placement
-from runtime.meshes.mesh_pass import MeshBuffers, MeshCopies
+from runtime.meshes.buffers import MeshBuffers
+from runtime.meshes.copies import MeshCopies
 from runtime.viewing.viewer import Viewer
 
 # How far, in parts of the fan's radius, a mesh may reach beyond the object that was baked, or stay behind it.

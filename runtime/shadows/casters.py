@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from impostor.lighting import DirectionalLight
 from runtime.fans.batch import Batch
-from runtime.meshes.mesh_pass import MeshCopies, MeshInstance
+from runtime.meshes.copies import MeshCopies, MeshInstance
 from runtime.shadows.bounds import in_view, shadow_hulls
 from runtime.shadows.meshes import mesh_corners
 from runtime.shadows.receiver import Receiver

@@ -17,7 +17,8 @@ from runtime.gl.programs import load_program, set_uniforms
 from runtime.gl.state import set_state
 from runtime.gl.uploads import CORNERS, InstanceBuffer
 from runtime.lights.contact_settings import ContactShadows
-from runtime.meshes.mesh_pass import MeshBuffers, MeshCopies
+from runtime.meshes.buffers import MeshBuffers
+from runtime.meshes.copies import MeshCopies
 from runtime.shadows.bounds import in_view
 from runtime.shadows.footprints import LIFTS, SIDE, Footprint, fan_footprint, model_footprint
 from runtime.shadows.strips import CastingFan

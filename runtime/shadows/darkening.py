@@ -12,7 +12,7 @@ from runtime.gl.programs import load_program, set_uniforms
 from runtime.gl.state import CallerState, set_state
 from runtime.gl.uploads import CORNERS, InstanceBuffer
 from runtime.ground.ground_pass import GroundSurface, metres_from_screen
-from runtime.meshes.mesh_pass import COPY_DTYPE
+from runtime.meshes.buffers import COPY_DTYPE
 from runtime.shadows.bounds import CELL
 from runtime.shadows.marks import CELL_DTYPE, CHANNELS, Mark, Marks
 from runtime.shadows.receiver import Receiver

@@ -21,7 +21,7 @@ from impostor.shadow_projection import Ground
 from runtime.gl.state import clear_color, set_state
 from runtime.gl.uploads import CORNERS, InstanceBuffer, check_texture_size
 from runtime.lights.contact_settings import ContactShadows
-from runtime.meshes.mesh_pass import MeshCopies
+from runtime.meshes.copies import MeshCopies
 from runtime.shadows.bounds import covered_cells
 from runtime.shadows.casters import Casters
 from runtime.shadows.contact import ContactPass

@@ -10,7 +10,8 @@ from impostor.lighting import DirectionalLight
 from impostor.shadow_projection import Ground
 from runtime.gl.programs import load_program, set_uniforms
 from runtime.gl.uploads import InstanceBuffer
-from runtime.meshes.mesh_pass import COPY_DTYPE, MeshCopies, draw_parts
+from runtime.meshes.buffers import COPY_DTYPE, draw_parts
+from runtime.meshes.copies import MeshCopies
 from runtime.shadows.bounds import box_corners
 from runtime.shadows.soft_light import MOST_POINTS, source_points, step_at_metre
 

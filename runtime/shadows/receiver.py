@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impostor.shadow_projection import Ground
-from runtime.meshes.mesh_pass import MeshCopies, MeshInstance
+from runtime.meshes.copies import MeshCopies, MeshInstance
 from runtime.shadows.bounds import window_around
 from runtime.shadows.meshes import mesh_corners
 from runtime.surfaces.surface_pass import Surface

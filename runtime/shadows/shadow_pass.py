@@ -13,7 +13,7 @@ from runtime.gl.state import CallerState
 from runtime.ground.ground_light import BrightLights, ground_light
 from runtime.ground.ground_pass import GroundSurface
 from runtime.lights.settings import LightSettings
-from runtime.meshes.mesh_pass import MeshInstance
+from runtime.meshes.copies import MeshInstance
 from runtime.shadows.casters import casters_for
 from runtime.shadows.darkening import MOST_LIGHTS, DarkeningPass
 from runtime.shadows.marks import CHANNELS, Mark, MarkPass, Marks

@@ -26,7 +26,7 @@ from runtime.gl.state import preserved_state
 from runtime.instances.instances import Instances
 from runtime.instances.quads import quads_toward
 from runtime.lights.contact_settings import ContactShadows
-from runtime.meshes.mesh_pass import MeshInstance
+from runtime.meshes.copies import MeshInstance
 from runtime.renderer import ImpostorRenderer
 from runtime.stage.assets import Assets, Shelf
 from runtime.stage.ground import GREY, ground_surface, under

@@ -14,7 +14,7 @@ from impostor.views import rotation_about_y
 from runtime.fans.lod import LevelOfDetail
 from runtime.gl.state import preserved_state
 from runtime.meshes.bump import Bump
-from runtime.meshes.mesh_pass import MeshCopies
+from runtime.meshes.copies import MeshCopies
 from runtime.viewing.viewer import Viewer
 from tests.pictures import filling, placed
 from tests.solids import Box, Sphere, solid_fan, solid_model
