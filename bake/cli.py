@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from impostor.cli import AllowMissing, Force, Quiet, UpAxis, as_flags, check_name, progress_bar
+from impostor.commands import AllowMissing, Force, Quiet, UpAxis, as_flags, check_name, progress_bar
 
 
 def register(app: typer.Typer) -> None:

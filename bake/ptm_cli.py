@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from impostor.cli import AsJson, Force, Quiet, UpAxis, as_flags, check_name, progress_bar
+from impostor.commands import AsJson, Force, Quiet, UpAxis, as_flags, check_name, progress_bar
 from impostor.errors import PhotographError, SettingsError
 from impostor.ptm_cli import Jpeg, JpegPhotographs, light_flag, numbers
 

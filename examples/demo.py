@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from bake.fan import bake_fan
 from impostor import DirectionalLight, Fan, Gloss, ImpostorError, Model, load, load_model, save
-from impostor.cli import progress_bar
+from impostor.commands import progress_bar
 from impostor.files.output import atomic_output
 from impostor.files.pictures import save_png
 from impostor.summary import write_contact_sheet

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from impostor.cli import AsJson, Force, Quiet, as_flags, check_name, print_summary
+from impostor.commands import AsJson, Force, Quiet, as_flags, check_name, print_summary
 from impostor.errors import SettingsError
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+INTERRUPTED = 130  # the exit code that Typer, and every shell, makes of Ctrl-C
 _signals: list[int] = []  # of the command that runs
 
 

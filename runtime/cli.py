@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from impostor.cli import (
+from impostor.commands import (
     AllowMissing,
     AsJson,
     BakedUpAxis,

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from impostor.cli import INTERRUPTED, AsJson, Force, Quiet, check_name, progress_bar
+from impostor.commands import AsJson, Force, Quiet, check_name, progress_bar
 from impostor.errors import GpuError, SettingsError, ViewWarning
+from impostor.stopping import INTERRUPTED
 
 if TYPE_CHECKING:
     import moderngl
