@@ -140,6 +140,21 @@ def test_a_written_capture_set_reads_back(tmp_path, quality):
         write_capture([np.zeros((4, 5, 3))] * 2, lights, tmp_path / "a.lp", quality=quality)
 
 
+@pytest.mark.parametrize("force", [False, True])
+def test_a_capture_set_that_is_stopped_leaves_nothing_half_written(tmp_path, monkeypatch, force):
+    pictures, lights = [np.full((4, 5, 3), 0.2)] * 2, np.array([[0.6, 0, 0.8], [0, 0, 1.0]])
+    if force:
+        write_capture(pictures, lights, tmp_path / "a.lp")
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bake.reliefs.write_lp", stop)
+    with pytest.raises(KeyboardInterrupt):
+        write_capture(pictures, lights, tmp_path / "a.lp", force=force)
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("wrong", [{"lights": [(0, 0, -1)]}, {"albedo": 1.5}, {"heights": np.full((4, 4), np.inf)}])
 def test_what_cannot_be_photographed_is_refused(wrong):
     with pytest.raises(SettingsError):
