@@ -197,6 +197,7 @@ def synthesise(
     """Quilt a PTM of any size that repeats without a seam."""
     from impostor.files.ptm_file import read_ptm
     from impostor.files.ptm_header import LARGEST_SIDE
+    from impostor.ptm.synthesis import SMALLEST_PATCH
     from impostor.ptm.synthesis import synthesise as quilted
 
     check_name(output, ".ptm", force)
@@ -208,8 +209,8 @@ def synthesise(
         raise SettingsError("--size", f"{size}; expected sides up to {LARGEST_SIDE}, as a .ptm can hold")
     read = read_ptm(ptm)
     if patch is None:
-        patch = min(PATCH, min(read.size) // 2)
-    with as_flags("size", "patch", "seed"), progress_bar(f"quilting {ptm.name}", quiet) as progress:
+        patch = max(min(PATCH, min(read.size) // 2), SMALLEST_PATCH)
+    with as_flags("size", "patch", "seed", PTM=str(ptm)), progress_bar(f"quilting {ptm.name}", quiet) as progress:
         made = quilted(read, (width, height), patch, seed, progress)
     written = _write(made, output, jpeg, no_prediction, force)
     if not quiet:
