@@ -232,7 +232,7 @@ def test_lights_that_fit_would_refuse_are_not_written(capsys, tmp_path):
     front, behind = write_photographs(tmp_path, balls, name="ball")
     circle, output = f"{BALL.x},{BALL.y},{BALL.radius}", tmp_path / "a.lp"
     said = refused(capsys, "ptm", "lights", front, behind, "--circle", circle, "-o", output)[1]
-    assert "ball01.png" in said and "in front" in said
+    assert f"{behind}: light's z" in said and "in front" in said
     said = refused(capsys, "ptm", "lights", front, "--circle", circle, "-o", output, "--of", tmp_path / "none.png")[1]
     assert "none.png: does not exist" in said
     said = refused(capsys, "ptm", "lights", front, front, "--circle", circle, "-o", output)[1]
