@@ -139,7 +139,7 @@ def light_parameters(capture: CaptureSet) -> NDArray[np.float64]:
     """
     behind = np.flatnonzero(capture.directions[:, 2] < LOWEST)
     if len(behind):
-        name = capture.photographs[behind[0]].name if capture.photographs else f"light {behind[0] + 1}"
+        name = capture.photographs[behind[0]] if capture.photographs else f"light {behind[0] + 1}"
         raise SettingsError(name, f"light's z is {capture.directions[behind[0], 2]:.3g}; expected above 0, in front")
     return capture.directions[:, :2]
 

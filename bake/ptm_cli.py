@@ -12,7 +12,7 @@ import typer
 
 from impostor.commands import AsJson, Force, Quiet, UpAxis, as_flags, check_name, progress_bar
 from impostor.errors import PhotographError, SettingsError
-from impostor.ptm_cli import Jpeg, JpegPhotographs, light_flag, numbers
+from impostor.ptm_cli import Jpeg, JpegPhotographs, light_flag, numbers, write_with_bar
 
 if TYPE_CHECKING:
     import numpy as np
@@ -56,7 +56,6 @@ def fit(
     from bake.design import ALL_TERMS, ONE_PARAMETER, make_design
     from bake.photographs import open_photographs
     from bake.ptm import check_choices, fit_ptm, worker_count
-    from impostor.files.ptm_file import write_ptm
     from impostor.ptm import quantise
 
     started = time.monotonic()
@@ -92,10 +91,7 @@ def fit(
         )
     coefficients = quantise(polynomials)
     del polynomials
-    if jpeg is None:
-        written = write_ptm(coefficients, output, force=force)
-    else:
-        written = write_ptm(coefficients, output, compression="jpeg", quality=jpeg, force=force)
+    written = write_with_bar(coefficients, output, jpeg, False, force, quiet)
     if not quiet:
         width, height = photographs.size
         typer.echo(
@@ -195,10 +191,13 @@ def capture(
     check_name(output, ".lp", force)
     directions = parse_dome(dome)
     strength, shininess = (0.0, 60.0) if gloss is None else numbers("--gloss", gloss, 2)
+    if strength < 0 or shininess <= 0:
+        raise SettingsError("--gloss", f"{gloss}; expected a strength of 0 or more, a shininess above 0")
     highlight = strength, shininess
     if subject.suffix.lower() in PICTURES:
         _refuse(subject, "a model", size=size, **{"from": side}, up=up)
-        relief = relief_of_picture(subject, DEPTH if depth is None else depth, albedo, highlight)
+        with as_flags(relief=str(subject)):
+            relief = relief_of_picture(subject, DEPTH if depth is None else depth, albedo, highlight)
     else:
         from impostor.model import load_model
 

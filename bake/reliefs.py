@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,9 @@ from PIL import Image
 
 from bake.photographs import open_photographs
 from bake.synthetic_capture import LARGEST_SIDE, Relief
-from impostor.errors import OutputError, SettingsError
+from impostor.errors import SettingsError
 from impostor.files.lp_file import CaptureSet, write_lp
-from impostor.files.output import atomic_output
+from impostor.files.output import atomic_output, check_output
 from impostor.model import Model
 from impostor.srgb import linear_from_srgb, srgb_from_linear
 from impostor.views import basis_facing, direction, frame
@@ -124,7 +125,7 @@ def write_capture(
     quality: int | None = None,
     force: bool = False,
 ) -> CaptureSet:
-    """Write photographs beside the `.lp` file that names them; that comes last, so a set with it is whole.
+    """Write photographs beside the `.lp` file that names them: a whole set, or nothing of it.
 
     Parameters
     ----------
@@ -151,15 +152,28 @@ def write_capture(
     suffix = ".png" if quality is None else ".jpg"
     paths = tuple(lp.with_name(f"{lp.stem}_{number:0{digits}}{suffix}") for number in range(len(pictures)))
     for path in (lp, *paths):
-        if path.exists() and not force:
-            raise OutputError(path, "exists already; expected a new file, or --force to replace it")
-    for path, picture in zip(paths, pictures, strict=True):
-        stored = Image.fromarray(np.rint(srgb_from_linear(picture) * 255).astype(np.uint8))
-        with atomic_output(path, force) as temporary:
-            if quality is None:
-                stored.save(temporary, "PNG")
-            else:
-                stored.save(temporary, "JPEG", quality=quality, subsampling=0)
-    capture = CaptureSet(paths, np.asarray(lights, np.float64))
-    write_lp(capture, lp, force)
+        check_output(path, force)
+    encoded = [_encoded(picture, quality) for picture in pictures]
+    capture, written = CaptureSet(paths, np.asarray(lights, np.float64)), list[Path]()
+    try:
+        for path, data in zip(paths, encoded, strict=True):
+            with atomic_output(path, force) as temporary:
+                temporary.write_bytes(data)
+            written.append(path)
+        write_lp(capture, lp, force)
+    except BaseException:
+        # Neither a part of a set may stay, nor an older `.lp` that now names photographs of two.
+        for path in (*written, lp) if written else ():
+            path.unlink(missing_ok=True)
+        raise
     return capture
+
+
+def _encoded(picture: NDArray[Any], quality: int | None) -> bytes:
+    """A picture of linear light as PNG or JPEG."""
+    stored, file = Image.fromarray(np.rint(srgb_from_linear(picture) * 255).astype(np.uint8)), BytesIO()
+    if quality is None:
+        stored.save(file, "PNG")
+    else:
+        stored.save(file, "JPEG", quality=quality, subsampling=0)
+    return file.getvalue()

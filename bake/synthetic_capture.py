@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,7 @@ from impostor.errors import SettingsError
 
 LARGEST_SIDE = 2048
 AZIMUTHS = 24  # directions in which a texel looks for others that light it
+BAND = 1 << 13  # texels whose form factors are in memory at a time: some hundreds each
 LIGHT_RADIUS = math.radians(0.5)  # of the lamps: what makes the penumbra
 Floats = NDArray[np.floating[Any]]
 
@@ -80,7 +81,7 @@ def photograph(
     bounce : bool
         Add the light that reaches a texel from the others, once reflected.
     progress : callable
-        Called with lights done and lights in all.
+        Called with steps done and steps in all: lights, then bands of bounced light.
 
     Returns
     -------
@@ -98,20 +99,25 @@ def photograph(
     if not (directions[:, 2] > 0).all():
         raise SettingsError("lights", f"lowest z is {directions[:, 2].min():g}; expected above 0, above the horizon")
     normals = relief.normals()
-    exchange = form_factors(relief) if bounce else None
+    bands = math.ceil(relief.heights.size / BAND) if bounce else 0
     pictures = np.empty((len(directions), *relief.albedo.shape), np.float32)
+    added = np.zeros_like(pictures)  # what does not bounce: highlights, and light that has bounced
     for number, light in enumerate(directions):
         visible = visibility(relief.heights, light)
-        direct = relief.albedo * (visible * np.maximum(normals @ light, 0))[..., None]
-        pictures[number] = direct
-        if exchange is not None:
-            received = exchange @ direct.reshape(-1, 3)
-            pictures[number] += relief.albedo * received.reshape(direct.shape)
+        pictures[number] = relief.albedo * (visible * np.maximum(normals @ light, 0))[..., None]
         if relief.gloss:
             half = light + [0, 0, 1]
             shine = np.maximum(normals @ (half / np.linalg.norm(half)), 0) ** relief.shininess
-            pictures[number] += (relief.gloss * visible * shine * (relief.albedo.max(axis=-1) > 0))[..., None]
-        progress(number + 1, len(directions))
+            added[number] = (relief.gloss * visible * shine * (relief.albedo.max(axis=-1) > 0))[..., None]
+        progress(number + 1, len(directions) + bands)
+    if bounce:
+        albedo = relief.albedo.reshape(-1, 3).astype(np.float32)
+        for number, band in enumerate(form_factors(relief)):
+            texels = slice(number * BAND, (number + 1) * BAND)
+            for direct, more in zip(pictures, added, strict=True):
+                more.reshape(-1, 3)[texels] += albedo[texels] * (band @ direct.reshape(-1, 3))
+            progress(len(directions) + number + 1, len(directions) + bands)
+    pictures += added
     return pictures
 
 
@@ -143,58 +149,80 @@ def visibility(heights: NDArray[np.float64], light: ArrayLike) -> NDArray[np.flo
     return np.clip((elevation - np.arctan(horizon)) / (2 * LIGHT_RADIUS) + 0.5, 0, 1)
 
 
-def form_factors(relief: Relief) -> sparse.csr_matrix:
+def form_factors(relief: Relief) -> Iterator[sparse.csr_matrix]:
     """Which share of what reaches each texel comes from each other one.
 
     Parameters
     ----------
     relief : Relief
 
-    Returns
-    -------
-    sparse matrix of shape (H * W, H * W)
-        Its product with the texels' reflected light is the light that they receive, in the unit in which a light at
-        normal incidence gives 1.
+    Yields
+    ------
+    sparse matrix of shape (n, H * W), float32
+        The rows of n texels, the picture's first ones first. Its product with the texels' reflected light is the light
+        that the n receive, in the unit in which a light at normal incidence gives 1.
 
     Notes
     -----
     In each of 24 azimuths a texel's horizon rises from its tangent plane, step by step outward. Each step that lifts
     it shows a piece of surface between the old horizon and the new, over which the cosine is integrated exactly.
     """
-    heights, normals = relief.heights, relief.normals()
-    index = np.arange(heights.size).reshape(heights.shape)
-    rows, columns, shares = [], [], []
-    for azimuth in (np.arange(AZIMUTHS) + 0.5) * 2 * np.pi / AZIMUTHS:
-        x, y = math.cos(azimuth), math.sin(azimuth)
-        along, up = normals[..., 0] * x + normals[..., 1] * y, normals[..., 2]
-        horizon = np.arctan2(-along, up)  # the tangent plane
-        for step in range(1, math.ceil(math.hypot(*heights.shape))):
-            if (np.arctan((heights.max() - heights) / step) <= horizon).all():
-                break
-            row, column = _rounded(heights.shape, x * step, y * step)
-            inside = (row >= 0) & (row < heights.shape[0]) & (column >= 0) & (column < heights.shape[1])
-            angle = np.arctan((_shifted(heights, x * step, y * step) - heights) / step)
-            seen = (angle > horizon) & inside
-            if not seen.any():
-                continue
-            low, high = horizon[seen], angle[seen]
-            flat = along[seen] * ((high - low) / 2 + (np.sin(2 * high) - np.sin(2 * low)) / 4)
-            steep = up[seen] * (np.sin(high) ** 2 - np.sin(low) ** 2) / 2
-            rows.append(index[seen])
-            columns.append(index[row[seen], column[seen]])
-            shares.append((flat + steep) * 2 / AZIMUTHS)
-            horizon[seen] = high
-    if not rows:
-        return sparse.csr_matrix((heights.size, heights.size))
-    entries = np.concatenate(shares), (np.concatenate(rows), np.concatenate(columns))
-    return sparse.csr_matrix(entries, shape=(heights.size, heights.size))
+    normals = relief.normals().reshape(-1, 3)
+    for start in range(0, relief.heights.size, BAND):
+        texels = np.arange(start, min(start + BAND, relief.heights.size))
+        pieces = [
+            piece
+            for azimuth in (np.arange(AZIMUTHS) + 0.5) * 2 * np.pi / AZIMUTHS
+            for piece in _pieces(relief.heights, normals[texels], texels, math.cos(azimuth), math.sin(azimuth))
+        ]
+        rows, columns, shares = (np.concatenate(part) for part in zip(*pieces, strict=True))
+        entries = shares * np.float32(2 / AZIMUTHS), (rows, columns)
+        yield sparse.csr_matrix(entries, shape=(len(texels), relief.heights.size))
+
+
+def _pieces(
+    heights: NDArray[np.float64], normals: NDArray[np.float64], texels: NDArray[np.int64], x: float, y: float
+) -> Iterator[tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float32]]]:
+    """What texels see of the surface along one azimuth, step by step: rows, columns and shares of the form factors."""
+    height, width = heights.shape
+    row, column = np.divmod(texels, width)
+    own, top = heights.ravel()[texels], heights.max()
+    along, up = normals[:, 0] * x + normals[:, 1] * y, normals[:, 2]
+    horizon = -along / up  # slope of the tangent plane
+    left = np.arange(len(texels))  # whose horizon something may still lift
+    step = 0
+    while len(left):
+        step += 1
+        at, across = row[left] - y * step, column[left] + x * step
+        inside = (at > -0.5) & (at < height - 0.5) & (across > -0.5) & (across < width - 0.5)
+        kept = inside & (top - own[left] > horizon[left] * step)
+        left, at, across = left[kept], at[kept], across[kept]
+        slope = (_interpolated(heights, at, across) - own[left]) / step
+        seen = slope > horizon[left]
+        low, high, texel = horizon[left[seen]], slope[seen], left[seen]
+        # Integrals of cos² and of sin cos of the elevation, whose tangents the slopes are.
+        flat = (np.arctan(high) - np.arctan(low) + high / (1 + high**2) - low / (1 + low**2)) / 2
+        steep = (high**2 / (1 + high**2) - low**2 / (1 + low**2)) / 2
+        whence = np.rint(at[seen]) * width + np.rint(across[seen])
+        yield (
+            texel.astype(np.int32),
+            whence.astype(np.int32),
+            (along[texel] * flat + up[texel] * steep).astype(np.float32),
+        )
+        horizon[texel] = high
+
+
+def _interpolated(heights: NDArray[np.float64], row: Floats, column: Floats) -> NDArray[np.float64]:
+    """Heights at places, linear between texels' centres; the floor outside them."""
+    height, width = heights.shape
+    top, left = row.astype(np.int64).clip(0, height - 2), column.astype(np.int64).clip(0, width - 2)
+    down, right = row - top, column - left
+    upper = heights[top, left] * (1 - right) + heights[top, left + 1] * right
+    lower = heights[top + 1, left] * (1 - right) + heights[top + 1, left + 1] * right
+    within = (row >= 0) & (row <= height - 1) & (column >= 0) & (column <= width - 1)
+    return np.where(within, upper * (1 - down) + lower * down, heights.min())
 
 
 def _shifted(heights: NDArray[np.float64], right: float, up: float) -> NDArray[np.float64]:
     """The heights a step away from every texel; the floor outside the picture."""
     return ndimage.shift(heights, (up, -right), order=1, mode="constant", cval=float(heights.min()))
-
-
-def _rounded(shape: tuple[int, ...], right: float, up: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    row, column = np.indices(shape)
-    return row - round(up), column + round(right)

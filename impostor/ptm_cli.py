@@ -132,7 +132,7 @@ def convert(
     before = ptm.stat().st_size  # now: the output may be the same file
     if kind not in (None, read.format):
         read = quantise(converted(read.polynomials(), cast(Literal["RGB", "LRGB", "LUM"], kind)))
-    written = _write(read, output, jpeg, no_prediction, force)
+    written = write_with_bar(read, output, jpeg, no_prediction, force, quiet)
     if not quiet:
         typer.echo(f"{ptm} ({before / 1e6:.2f} MB) -> {output} ({read.format}, {written / 1e6:.2f} MB)")
 
@@ -197,6 +197,7 @@ def synthesise(
     """Quilt a PTM of any size that repeats without a seam."""
     from impostor.files.ptm_file import read_ptm
     from impostor.files.ptm_header import LARGEST_SIDE
+    from impostor.ptm.synthesis import SMALLEST_PATCH
     from impostor.ptm.synthesis import synthesise as quilted
 
     check_name(output, ".ptm", force)
@@ -208,10 +209,10 @@ def synthesise(
         raise SettingsError("--size", f"{size}; expected sides up to {LARGEST_SIDE}, as a .ptm can hold")
     read = read_ptm(ptm)
     if patch is None:
-        patch = min(PATCH, min(read.size) // 2)
-    with as_flags("size", "patch", "seed"), progress_bar(f"quilting {ptm.name}", quiet) as progress:
+        patch = max(min(PATCH, min(read.size) // 2), SMALLEST_PATCH)
+    with as_flags("size", "patch", "seed", PTM=str(ptm)), progress_bar(f"quilting {ptm.name}", quiet) as progress:
         made = quilted(read, (width, height), patch, seed, progress)
-    written = _write(made, output, jpeg, no_prediction, force)
+    written = write_with_bar(made, output, jpeg, no_prediction, force, quiet)
     if not quiet:
         typer.echo(f"{ptm} ({read.size[0]}x{read.size[1]}) -> {output} ({width}x{height}, {written / 1e6:.1f} MB)")
 
@@ -251,7 +252,8 @@ def _bytes(picture: NDArray[np.floating]) -> NDArray[np.uint8]:
     return np.rint(np.clip(picture, 0, 1) * 255).astype(np.uint8)
 
 
-def _write(ptm: Ptm, output: Path, jpeg: int | None, no_prediction: bool, force: bool) -> int:
+def write_with_bar(ptm: Ptm, output: Path, jpeg: int | None, no_prediction: bool, force: bool, quiet: bool) -> int:
+    """Write a PTM as flags ask for it: the file's size in bytes."""
     from impostor.files.ptm_file import write_ptm
 
     if jpeg is None:
@@ -260,7 +262,9 @@ def _write(ptm: Ptm, output: Path, jpeg: int | None, no_prediction: bool, force:
         return write_ptm(ptm, output, force=force)
     if ptm.format == "LUM":
         raise SettingsError("--jpeg", "the PTM is LUM; expected LRGB or RGB, which have a compressed kind")
-    return write_ptm(ptm, output, compression="jpeg", quality=jpeg, predict=not no_prediction, force=force)
+    predict = not no_prediction
+    with progress_bar(f"compressing {output.name}", quiet) as progress:
+        return write_ptm(ptm, output, compression="jpeg", quality=jpeg, predict=predict, force=force, progress=progress)
 
 
 def _check_lights(polynomials: Polynomials, ptm: Path, wanted: str) -> None:

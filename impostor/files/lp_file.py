@@ -18,6 +18,7 @@ from impostor.files.output import atomic_output
 FilePath = str | os.PathLike[str]
 LARGEST_FILE = 16 * 1024 * 1024
 LONGEST_NUMBER = 64
+COLUMNS = "x y z"
 SHORTEST = 1e-6  # A vector shorter than this has no direction that its digits could tell.
 _NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*|,[0-9]+)?|[.,][0-9]+)([eE][-+]?[0-9]+)?")
 
@@ -67,18 +68,7 @@ def read_lp(path: FilePath) -> CaptureSet:
         A line cannot be read, the count lies, there are no names, or a photograph is missing or named twice.
     """
     names, directions = read_lights(path)
-    if not names:
-        raise LpFileError(path, "its lines name no photographs; expected 'name x y z'")
-    folder = _Folder(Path(path).parent)
-    found: dict[Path, str] = {}
-    for name in names:
-        photograph = folder.find(name)
-        if photograph is None:
-            raise LpFileError(path, f"photograph {name!r} does not exist beside the file; expected it there")
-        if photograph in found:
-            raise LpFileError(path, f"photograph {name!r} and {found[photograph]!r} are one file; expected each once")
-        found[photograph] = name
-    return CaptureSet(tuple(found), directions)
+    return CaptureSet(find_photographs(path, names, COLUMNS), directions)
 
 
 def read_lights(path: FilePath) -> tuple[tuple[str, ...], NDArray[np.float64]]:
@@ -100,9 +90,37 @@ def read_lights(path: FilePath) -> tuple[tuple[str, ...], NDArray[np.float64]]:
     LpFileError
         As `read_lp`, but for the photographs.
     """
-    lines = [(number, line.strip()) for number, line in enumerate(_text(path).splitlines(), 1) if line.strip()]
+    names, numbers = [], []
+    for number, name, values in named_numbers(path, COLUMNS):
+        names.append(name)
+        numbers.append(_unit(path, number, values))
+    return tuple(filter(None, names)), np.array(numbers)
+
+
+def named_numbers(path: FilePath, columns: str) -> list[tuple[int, str, list[float]]]:
+    """Read lines of a name and some numbers, spelled as in a `.lp` file; a first line that counts them is optional.
+
+    Parameters
+    ----------
+    path : path-like
+    columns : str
+        What the numbers are called, a word for each.
+
+    Returns
+    -------
+    list of (int, str, list of float)
+        Of each line: which one it is, the name, and the numbers, of which a long one may be infinite. Names are empty
+        where no line has one.
+
+    Raises
+    ------
+    LpFileError
+        A line cannot be read, the count lies, or some lines have names and others none.
+    """
+    wanted = f"expected 'name {columns}'"
+    lines = [(number, line.strip()) for number, line in enumerate(_text(path, columns).splitlines(), 1) if line.strip()]
     if not lines:
-        raise LpFileError(path, "is empty; expected a count, then lines of 'name x y z'")
+        raise LpFileError(path, f"is empty; expected a count, then lines of 'name {columns}'")
     counted = re.fullmatch(r"\+?[0-9]{1,9}", lines[0][1])
     if counted:
         count, lines = int(counted[0]), lines[1:]
@@ -110,12 +128,41 @@ def read_lights(path: FilePath) -> tuple[tuple[str, ...], NDArray[np.float64]]:
             raise LpFileError(path, f"line 1: counts {count} photographs; {len(lines)} lines follow")
         if not lines:
             raise LpFileError(path, "counts no photographs; expected at least one")
-    read = [_light(path, number, line) for number, line in lines]
-    named = [name for name, _ in read if name]
-    if named and len(named) != len(read):
-        number = next(number for (number, _), (name, _) in zip(lines, read, strict=True) if not name)
-        raise LpFileError(path, f"line {number}: names no photograph, other lines do; expected 'name x y z'")
-    return tuple(named), np.array([direction for _, direction in read])
+    rows = [(number, *_row(path, number, line, columns)) for number, line in lines]
+    unnamed = [number for number, name, _ in rows if not name]
+    if 0 < len(unnamed) < len(rows):
+        raise LpFileError(path, f"line {unnamed[0]}: names no photograph, other lines do; {wanted}")
+    return rows
+
+
+def find_photographs(path: FilePath, names: Sequence[str], columns: str) -> tuple[Path, ...]:
+    """The photographs that the lines of a file name, sought as `read_lp` has it.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    names : sequence of str
+    columns : str
+        As `named_numbers`.
+
+    Raises
+    ------
+    LpFileError
+        There are no names, or a photograph is missing or named twice.
+    """
+    if not any(names):
+        raise LpFileError(path, f"its lines name no photographs; expected 'name {columns}'")
+    folder = _Folder(Path(path).parent)
+    found: dict[Path, str] = {}
+    for name in names:
+        photograph = folder.find(name)
+        if photograph is None:
+            raise LpFileError(path, f"photograph {name!r} does not exist beside the file; expected it there")
+        if photograph in found:
+            raise LpFileError(path, f"photograph {name!r} and {found[photograph]!r} are one file; expected each once")
+        found[photograph] = name
+    return tuple(found)
 
 
 def write_lp(capture: CaptureSet, path: FilePath, force: bool = False) -> None:
@@ -160,12 +207,12 @@ def _is_read_back(line: str, name: str) -> bool:
     """Whether a line, written as UTF-8, gives this name again."""
     try:
         line.encode("utf-8")
-        return line.splitlines() == [line] and _light("", 0, line.strip())[0] == name
+        return line.splitlines() == [line] and _row("", 0, line.strip(), COLUMNS)[0] == name
     except (UnicodeEncodeError, LpFileError):
         return False
 
 
-def _text(path: FilePath) -> str:
+def _text(path: FilePath, columns: str) -> str:
     try:
         if not Path(path).is_file():
             raise LpFileError(path, "is a directory or no ordinary file" if Path(path).exists() else "does not exist")
@@ -174,7 +221,7 @@ def _text(path: FilePath) -> str:
     except OSError as error:
         raise LpFileError(path, f"cannot be read: {error.strerror}; expected a file that can") from error
     if len(data) > LARGEST_FILE:
-        raise LpFileError(path, f"is larger than {LARGEST_FILE} bytes; expected lines of 'name x y z'")
+        raise LpFileError(path, f"is larger than {LARGEST_FILE} bytes; expected lines of 'name {columns}'")
     wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     for encoding in ("utf-16",) if wide else ("utf-8-sig", "latin-1"):
         try:
@@ -183,30 +230,35 @@ def _text(path: FilePath) -> str:
             continue
         if "\0" not in text:
             return text
-    raise LpFileError(path, "is not text; expected lines of 'name x y z'")
+    raise LpFileError(path, f"is not text; expected lines of 'name {columns}'")
 
 
-def _light(path: FilePath, number: int, line: str) -> tuple[str, NDArray[np.float64]]:
-    """Name, or "", and unit direction of one line."""
-    split = next((words for words in _splits(line) if all(map(_is_number, words[1:]))), None)
+def _unit(path: FilePath, number: int, values: list[float]) -> NDArray[np.float64]:
+    """The unit direction of one line."""
+    direction = np.array(values)
+    length = np.linalg.norm(direction)
+    if not SHORTEST <= length < np.inf:
+        raise LpFileError(path, f"line {number}: light {values}; expected a vector of length 1")
+    return direction / length
+
+
+def _row(path: FilePath, number: int, line: str, columns: str) -> tuple[str, list[float]]:
+    """Name, or "", and numbers of one line."""
+    split = next((words for words in _splits(line, len(columns.split())) if all(map(_is_number, words[1:]))), None)
     if split is None:
-        raise LpFileError(path, f"line {number}: {line[:80]!r}; expected 'name x y z'")
+        raise LpFileError(path, f"line {number}: {line[:80]!r}; expected 'name {columns}'")
     name, *words = split
     if "," in line and all(word.lstrip("+-").isdecimal() for word in (name.rpartition(",")[2].strip(), *words)):
         raise LpFileError(path, f"line {number}: {line[:80]!r}: commas between numbers and in them; expected one kind")
-    direction = np.array([float(word.replace(",", ".")) for word in words])
-    length = np.linalg.norm(direction)
-    if not SHORTEST <= length < np.inf:
-        raise LpFileError(path, f"line {number}: light {direction.tolist()}; expected a vector of length 1")
-    return name.strip('"').strip(), direction / length
+    return name.strip('"').strip(), [float(word.replace(",", ".")) for word in words]
 
 
-def _splits(line: str) -> Iterator[list[str]]:
-    """A line as name, or "", and three words: split at white space, at semicolons and at commas."""
-    for words in (line.rsplit(None, 3), line.rsplit(";", 3), line.replace(",", " ").rsplit(None, 3)):
-        if len(words) >= 3:
-            name = line[: len(words[0])].rstrip(", \t") if len(words) == 4 else ""
-            yield [name, *(word.strip() for word in words[-3:])]
+def _splits(line: str, count: int) -> Iterator[list[str]]:
+    """A line as name, or "", and some words: split at white space, at semicolons and at commas."""
+    for words in (line.rsplit(None, count), line.rsplit(";", count), line.replace(",", " ").rsplit(None, count)):
+        if len(words) >= count:
+            name = line[: len(words[0])].rstrip(", \t") if len(words) == count + 1 else ""
+            yield [name, *(word.strip() for word in words[-count:])]
 
 
 def _is_number(word: str) -> bool:

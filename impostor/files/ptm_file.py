@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import zlib
+from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Literal
@@ -91,6 +92,7 @@ def write_ptm(
     quality: int = 95,
     predict: bool = True,
     force: bool = False,
+    progress: Callable[[int, int], None] | None = None,
 ) -> int:
     """Write a PTM; the same one gives the same bytes on the same machine.
 
@@ -106,6 +108,8 @@ def write_ptm(
         Allow a plane to be stored as its difference from another. Some viewers do not read that.
     force : bool
         Replace an existing file.
+    progress : callable, optional
+        Called with planes compressed and planes in all.
 
     Returns
     -------
@@ -126,7 +130,7 @@ def write_ptm(
     if compression not in (None, "jpeg"):
         raise SettingsError("compression", f"{compression!r}; expected None or 'jpeg'")
     check_quality(quality)
-    parts = _raw_parts(ptm) if compression is None else _jpeg_parts(ptm, quality, predict)
+    parts = _raw_parts(ptm) if compression is None else _jpeg_parts(ptm, quality, predict, progress)
     checksum = 0
     for part in parts:
         checksum = zlib.crc32(part, checksum)
@@ -199,7 +203,7 @@ def _raw_parts(ptm: Ptm) -> list[bytes]:
     return [header, coefficients.transpose(2, 0, 1, 3).tobytes()]
 
 
-def _jpeg_parts(ptm: Ptm, quality: int, predict: bool) -> list[bytes]:
+def _jpeg_parts(ptm: Ptm, quality: int, predict: bool, progress: Callable[[int, int], None] | None) -> list[bytes]:
     """Header and body of a file of JPEG planes."""
     name = f"JPEG_{ptm.format}"
     if name not in PLANES:
@@ -209,7 +213,7 @@ def _jpeg_parts(ptm: Ptm, quality: int, predict: bool) -> list[bytes]:
     if ptm.color is not None:
         texels = np.concatenate([texels, ptm.color], axis=-1)
     planes = [np.ascontiguousarray(texels[::-1, :, plane]) for plane in range(texels.shape[2])]
-    encoded = encode_planes(planes, quality, predict)
+    encoded = encode_planes(planes, quality, predict, progress)
     entries = tuple(plane.entry for plane in encoded)
     header = Header("PTM_1.2", name, width, height, ptm.scale, ptm.bias, None, quality, entries)
     return [header_bytes(header), *(part for plane in encoded for part in (plane.jpeg, plane.side))]

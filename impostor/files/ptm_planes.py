@@ -5,7 +5,7 @@ Planes are in the file's order of rows here, bottom row first.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from io import BytesIO
@@ -98,7 +98,9 @@ def decode_planes(
     return planes
 
 
-def encode_planes(planes: Sequence[Plane], quality: int, predict: bool) -> list[EncodedPlane]:
+def encode_planes(
+    planes: Sequence[Plane], quality: int, predict: bool, progress: Callable[[int, int], None] | None = None
+) -> list[EncodedPlane]:
     """Encode planes as grayscale JPEGs, each by itself or as its difference from another, whichever is smaller.
 
     Parameters
@@ -108,6 +110,8 @@ def encode_planes(planes: Sequence[Plane], quality: int, predict: bool) -> list[
         Of JPEG, 1..100.
     predict : bool
         Allow differences.
+    progress : callable, optional
+        Called with planes encoded and planes in all.
 
     Returns
     -------
@@ -128,7 +132,12 @@ def encode_planes(planes: Sequence[Plane], quality: int, predict: bool) -> list[
                 for index, (reference, _) in enumerate(references)
                 if index not in done and (reference < 0 or reference in done)
             ]
-            encoded = list(pool.map(lambda index: _smallest(planes[index], references[index], done, quality), ready))
+            encoding = pool.map(lambda index: _smallest(planes[index], references[index], done, quality), ready)
+            encoded = []
+            for one in encoding:
+                encoded.append(one)
+                if progress is not None:
+                    progress(len(done) + len(encoded), len(planes))
             for index, (jpeg, side, (reference, inverted), decoded) in zip(ready, encoded, strict=True):
                 done[index] = EncodedPlane(jpeg, side, len(done), reference, inverted, decoded)
     return [done[index] for index in range(len(planes))]

@@ -13,6 +13,7 @@ from impostor.errors import OutputError
 from impostor.files.output import atomic_output
 
 CODEC, QUALITY = "libx264", "18"  # constant rate factor: below it few people see a difference
+BT709, SRGB = 1, 13  # primaries and transfer function, by the numbers of ITU-T H.273
 
 
 def film_size(size: tuple[int, int]) -> tuple[int, int]:
@@ -49,6 +50,7 @@ def video_output(
     """
     import av
     from av.error import FFmpegError
+    from av.video.reformatter import ColorRange, Colorspace
 
     width, height = film_size(size)
     with atomic_output(path, force) as temporary:
@@ -56,9 +58,14 @@ def video_output(
             with av.open(str(temporary), "w", format="mp4") as container:
                 stream = container.add_stream(CODEC, rate=rate, options={"crf": QUALITY})
                 stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+                # A player takes a video that does not say for BT.601 or BT.709 by its height.
+                context = stream.codec_context
+                context.colorspace, context.color_range = Colorspace.ITU709, ColorRange.MPEG
+                context.color_primaries, context.color_trc = BT709, SRGB
 
                 def add(picture: NDArray[np.uint8]) -> None:
                     frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture[:height, :width]), format="rgb24")
+                    frame = frame.reformat(format="yuv420p", dst_colorspace=Colorspace.ITU709)
                     container.mux(stream.encode(frame))
 
                 yield add

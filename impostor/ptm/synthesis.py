@@ -67,6 +67,9 @@ def synthesise(
     HPL-2004-225, "Texture Synthesis"; Hel-Or, Malzbender, Gelb 2003; Efros and Freeman 2001 (image quilting);
     Perez, Gangnet, Blake 2003 (differences summed up, as a Poisson equation).
     """
+    if min(ptm.size) < SMALLEST_PATCH:
+        found = f"{ptm.size[0]}x{ptm.size[1]} texels"
+        raise SettingsError("PTM", f"{found}; expected sides of {SMALLEST_PATCH} or more, to cut patches from")
     polynomials = ptm.polynomials() if isinstance(ptm, Ptm) else ptm
     rows, columns = quilt(reflectance_features(polynomials), size, patch, seed, progress)
     fields = ("coefficients", "color", "chroma")
@@ -149,6 +152,7 @@ def reflectance_features(polynomials: Polynomials) -> NDArray[np.float32]:
     vectors = (coefficients @ np.linalg.cholesky(light_gram())).reshape(height * width, -1)
     variances, axes = np.linalg.eigh(np.cov(vectors, rowvar=False))
     kept = np.cumsum(variances) > LOST_VARIANCE * variances.sum()
+    kept[-1] = True  # of equal texels, too, something is left to look at
     return (vectors @ axes[:, kept]).reshape(height, width, -1).astype(np.float32)
 
 

@@ -232,7 +232,7 @@ def test_lights_that_fit_would_refuse_are_not_written(capsys, tmp_path):
     front, behind = write_photographs(tmp_path, balls, name="ball")
     circle, output = f"{BALL.x},{BALL.y},{BALL.radius}", tmp_path / "a.lp"
     said = refused(capsys, "ptm", "lights", front, behind, "--circle", circle, "-o", output)[1]
-    assert "ball01.png" in said and "in front" in said
+    assert f"{behind}: light's z" in said and "in front" in said
     said = refused(capsys, "ptm", "lights", front, "--circle", circle, "-o", output, "--of", tmp_path / "none.png")[1]
     assert "none.png: does not exist" in said
     said = refused(capsys, "ptm", "lights", front, front, "--circle", circle, "-o", output)[1]
@@ -254,11 +254,14 @@ def test_lights_that_fit_would_refuse_are_not_written(capsys, tmp_path):
         ("heights", ("--dome", "fibonacci:0"), "--dome: 'fibonacci:0': 0 lights"),
         ("heights", ("--dome", "rings:0x8"), "--dome: lowest z is 0; expected above 0"),
         ("heights", ("--jpeg", 101), "--jpeg: 101; expected 1 to 100"),
+        ("heights", ("--gloss", "1,0"), "--gloss: 1,0; expected a strength of 0 or more, a shininess above 0"),
+        ("row", (), "row00.png: heights of shape (1, 16); expected sides of 2 to"),
     ],
 )
 def test_flags_that_capture_has_no_use_for_are_refused(capsys, tmp_path, subject, flags, message):
     (heights,) = write_photographs(tmp_path, [np.zeros((16, 16), np.uint8)])
-    given = heights if subject == "heights" else SAMPLES / "knot.stl"
+    (row,) = write_photographs(tmp_path, [np.zeros((1, 16), np.uint8)], name="row")
+    given = {"heights": heights, "row": row, "knot": SAMPLES / "knot.stl"}[subject]
     assert message in refused(capsys, "ptm", "capture", given, "-o", tmp_path / "a.lp", *flags)[1]
     assert not (tmp_path / "a.lp").exists()
 

@@ -220,3 +220,10 @@ def test_hps_compressed_tablet_is_upright_and_lit_from_where_the_light_is():
     assert from_left[left].mean() > 2 * from_right[left].mean()
     assert from_right[right].mean() > 2 * from_left[right].mean()
     assert from_top[top].mean() > 2 * from_top[bottom].mean()
+
+
+def test_compressing_counts_its_planes(tmp_path):
+    steps = []
+    ptm = random_ptm("RGB")
+    write_ptm(ptm, tmp_path / "a.ptm", compression="jpeg", progress=lambda done, total: steps.append((done, total)))
+    assert steps == [(done, 18) for done in range(1, 19)]

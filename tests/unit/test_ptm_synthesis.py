@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from impostor.errors import SettingsError
-from impostor.ptm import Ptm, quantise, relight
+from impostor.ptm import Polynomials, Ptm, quantise, relight
 from impostor.ptm.synthesis import reflectance_features, synthesise, without_seams
 from tests.ptms import matt_bumps, random_polynomials
 
@@ -89,3 +89,16 @@ def test_a_seed_gives_one_texture_in_every_format(format):
 def test_sizes_that_do_not_go_together_are_refused(bumps, size, patch):
     with pytest.raises(SettingsError, match="expected"):
         synthesise(bumps, size, patch=patch)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (40, 1), (7, 40)])
+def test_too_small_a_ptm_to_cut_patches_from_is_refused(size):
+    with pytest.raises(SettingsError, match=f"{size[0]}x{size[1]} texels; expected sides of 8"):
+        synthesise(random_polynomials(size=size), (40, 40), patch=8)
+
+
+@pytest.mark.parametrize("value", [0.0, 0.5])
+def test_equal_texels_make_a_texture_of_equal_texels(value):
+    ptm = quantise(Polynomials(np.full((16, 16, 3, 6), value, np.float32)))
+    made = synthesise(ptm, (40, 30), patch=8)
+    assert (made.coefficients == ptm.coefficients[0, 0]).all()

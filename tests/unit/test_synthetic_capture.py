@@ -23,6 +23,11 @@ def groove(length=96, width=64):
     return np.tile(np.abs(np.arange(width) - (width - 1) / 2), (length, 1))
 
 
+def received(relief):
+    """What each texel gets of a surface that is white all over, (H * W,)."""
+    return np.concatenate([np.asarray(band.sum(axis=1)).ravel() for band in form_factors(relief)])
+
+
 @pytest.mark.parametrize("light", [(0, 0, 1), (0.6, 0, 0.8), (0, -0.8, 0.6)])
 def test_a_plain_surface_is_lamberts(light):
     found = photograph(even(np.zeros((8, 9))), [light])
@@ -66,14 +71,26 @@ def test_a_v_groove_is_brighter_by_its_bounce():
 
 def test_a_right_angled_groove_sees_itself_as_hottel_says():
     # Hottel's crossed strings: one wall of an endless right-angled groove sees 1 - sin 45 degrees of the other.
-    shares = np.asarray(form_factors(even(groove(length=200))).sum(axis=1)).reshape(200, 64)[100]
+    shares = received(even(groove(length=200))).reshape(200, 64)[100]
     assert shares.mean() == pytest.approx(1 - np.sin(np.pi / 4), rel=0.06)
 
 
 def test_a_plain_or_bulging_surface_receives_no_bounce():
     row, column = np.mgrid[-1:1:33j, -1:1:33j]
     for heights in (np.zeros((33, 33)), 8 * (1 - row**2 - column**2)):
-        assert form_factors(even(heights)).sum() < 0.02 * heights.size
+        assert received(even(heights)).sum() < 0.02 * heights.size
+
+
+def test_form_factors_take_no_more_memory_for_a_larger_picture():
+    noise = np.random.default_rng(1)
+    most = [max(band.nnz for band in form_factors(even(noise.random((128, width)) * 20))) for width in (128, 512)]
+    assert most[1] < 1.2 * most[0]
+
+
+def test_progress_counts_lights_and_bounces_to_the_end():
+    steps = []
+    photograph(even(groove(160, 160)), [HIGH, HIGH], progress=lambda done, total: steps.append((done, total)))
+    assert steps == [(done, len(steps)) for done in range(1, len(steps) + 1)] and len(steps) > 3
 
 
 def test_a_highlight_stands_where_the_surface_mirrors_the_light():
@@ -121,6 +138,21 @@ def test_a_written_capture_set_reads_back(tmp_path, quality):
     assert [path.stem for path in capture.photographs] == ["a_0", "a_1"]
     with pytest.raises(OutputError, match="exists already"):
         write_capture([np.zeros((4, 5, 3))] * 2, lights, tmp_path / "a.lp", quality=quality)
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_a_capture_set_that_is_stopped_leaves_nothing_half_written(tmp_path, monkeypatch, force):
+    pictures, lights = [np.full((4, 5, 3), 0.2)] * 2, np.array([[0.6, 0, 0.8], [0, 0, 1.0]])
+    if force:
+        write_capture(pictures, lights, tmp_path / "a.lp")
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bake.reliefs.write_lp", stop)
+    with pytest.raises(KeyboardInterrupt):
+        write_capture(pictures, lights, tmp_path / "a.lp", force=force)
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("wrong", [{"lights": [(0, 0, -1)]}, {"albedo": 1.5}, {"heights": np.full((4, 4), np.inf)}])
