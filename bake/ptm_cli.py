@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from impostor.commands import AsJson, Force, Quiet, UpAxis, as_flags, check_name, progress_bar
-from impostor.errors import PhotographError, SettingsError
+from impostor.errors import OutputError, PhotographError, SettingsError
 from impostor.ptm_cli import Jpeg, JpegPhotographs, light_flag, numbers, write_with_bar
 
 if TYPE_CHECKING:
@@ -185,11 +185,14 @@ def capture(
 ) -> None:
     """Photograph a mesh or a height picture under a dome, with its own shadows and one bounce of light."""
     from bake.dome import parse_dome
-    from bake.reliefs import relief_of_model, relief_of_picture, write_capture
+    from bake.reliefs import photograph_paths, relief_of_model, relief_of_picture, write_capture
     from bake.synthetic_capture import photograph
 
     check_name(output, ".lp", force)
     directions = parse_dome(dome)
+    for given in filter(None, (subject, albedo)):
+        if given.resolve() in {path.resolve() for path in photograph_paths(output, len(directions), jpeg)}:
+            raise OutputError(given, "would be replaced by a photograph; expected another name for the set")
     strength, shininess = (0.0, 60.0) if gloss is None else numbers("--gloss", gloss, 2)
     if strength < 0 or shininess <= 0:
         raise SettingsError("--gloss", f"{gloss}; expected a strength of 0 or more, a shininess above 0")

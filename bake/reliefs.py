@@ -117,6 +117,12 @@ def relief_of_model(model: Model, size: int, side: str = "front", gloss: tuple[f
     return Relief(heights - heights.min(), albedo, *gloss)
 
 
+def photograph_paths(lp: str | os.PathLike[str], count: int, quality: int | None = None) -> tuple[Path, ...]:
+    """Where `write_capture` puts so many photographs."""
+    lp, digits, suffix = Path(lp), len(str(count - 1)), ".png" if quality is None else ".jpg"
+    return tuple(lp.with_name(f"{lp.stem}_{number:0{digits}}{suffix}") for number in range(count))
+
+
 def write_capture(
     pictures: Sequence[NDArray[Any]],
     lights: ArrayLike,
@@ -148,9 +154,7 @@ def write_capture(
     OutputError
     """
     lp = Path(lp)
-    digits = len(str(len(pictures) - 1))
-    suffix = ".png" if quality is None else ".jpg"
-    paths = tuple(lp.with_name(f"{lp.stem}_{number:0{digits}}{suffix}") for number in range(len(pictures)))
+    paths = photograph_paths(lp, len(pictures), quality)
     for path in (lp, *paths):
         check_output(path, force)
     encoded = [_encoded(picture, quality) for picture in pictures]

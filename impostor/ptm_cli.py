@@ -76,7 +76,9 @@ def info(
 def render(
     ptm: PtmFile,
     output: Annotated[Path, typer.Option("-o", metavar="OUT.png")],
-    light: Annotated[str, typer.Option(metavar="LU,LV", help="The light: to the right, and up.")] = "0,0",
+    light: Annotated[
+        str | None, typer.Option(metavar="LU,LV", help="The light: to the right, and up; 0,0 is straight ahead.")
+    ] = None,
     show: Annotated[str, typer.Option("--output", metavar="lit|normal|albedo")] = "lit",
     gain: Gain = 1.0,
     specular: Specular = None,
@@ -91,11 +93,20 @@ def render(
     check_name(output, ".png", force)
     if show not in OUTPUTS:
         raise SettingsError("--output", f"{show!r}; expected one of {', '.join(OUTPUTS)}")
-    at = numbers("--light", light, 2)
+    if show != "lit":
+        for flag, given in (
+            ("--light", light is not None),
+            ("--gain", gain != 1),
+            ("--specular", specular is not None),
+        ):
+            if given:
+                raise SettingsError(flag, f"given with --output {show}; expected it with a lit picture")
+    toward = light or "0,0"
+    at = numbers("--light", toward, 2)
     shine = _highlight(specular)
     polynomials = read_ptm(ptm).polynomials()
     if polynomials.parameters != "series":
-        at = light_flag(light)
+        at = light_flag(toward)
     for flag, given in (("--output", show != "lit"), ("--gain", gain != 1), ("--specular", shine is not None)):
         if given:
             _check_lights(polynomials, ptm, flag)

@@ -139,6 +139,15 @@ def test_capture_of_a_height_picture_brightens_toward_the_light(capsys, tmp_path
     assert left[8, 16].mean() > right[8, 16].mean() + 40
 
 
+def test_capture_keeps_the_picture_that_it_photographs(capsys, tmp_path):
+    (heights,) = write_photographs(tmp_path, [np.zeros((16, 16), np.uint8)], name="dome_")
+    before = heights.read_bytes()
+    flags = "-o", tmp_path / "dome.lp", "--dome", "rings:45x12", "--force"
+    error = refused(capsys, "ptm", "capture", heights, *flags)[1]
+    assert "dome_00.png: would be replaced by a photograph" in error
+    assert heights.read_bytes() == before
+
+
 def test_lights_of_a_ball_become_a_capture_set(capsys, tmp_path):
     from tests.unit.test_chrome_ball import BALL, drawn_ball
 

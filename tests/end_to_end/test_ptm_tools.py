@@ -140,6 +140,11 @@ def test_a_small_ptm_is_quilted_from_smaller_patches(capsys, tmp_path):
         (["render", "{ptm}", "-o", "a.png", "--light", "nan,0"], "--light"),
         (["render", "{ptm}", "-o", "a.jpg"], "expected a name that ends in '.png'"),
         (["render", "{ptm}", "-o", "a.png", "--output", "depth"], "lit, normal, albedo"),
+        (
+            ["render", "{ptm}", "-o", "a.png", "--output", "normal", "--light=0.5,0"],
+            "--light: given with --output normal",
+        ),
+        (["render", "{ptm}", "-o", "a.png", "--output", "albedo", "--gain", "2"], "--gain: given with --output albedo"),
         (["render", "{ptm}", "-o", "a.png", "--specular", "-1,3"], "--specular"),
         (["render", "{ptm}", "-o", "a.png", "--gain", "nan"], "--gain: nan; expected a finite number"),
         (["relight-video", "{ptm}", "-o", "a.mp4", "--gain", "inf"], "--gain: inf"),
