@@ -66,7 +66,7 @@ def run(bench: Workbench) -> Table:
     say(f"ptm_peers: {SLOW}")
     seconds[SLOW] = run_fresh(commands[SLOW]).seconds
     base = times.median(0), psnr(_least_squares(fitted), test), 18, None
-    table.rows.append(_row("NumPy least squares, RGB, today", base, base))
+    table.rows.append(_row("NumPy least squares, RGB, beside ours", base, base))
     for label, (_, planes, *_) in OURS.items():
         path = outputs[label]
         found = seconds[label], psnr(read_ptm(path).polynomials(), test), planes, path.stat().st_size / 1e6
