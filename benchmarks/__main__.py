@@ -23,6 +23,8 @@ from benchmarks import (
     overhead,
     passes,
     ptm,
+    ptm_choices,
+    ptm_peers,
     quality,
     report,
     surfaces,
@@ -52,6 +54,9 @@ TABLES: dict[str, Callable[[Workbench], Table]] = {
     "surfaces": surfaces.run,
     "ptm": ptm.run_quality,
     "ptm_fit": ptm.run_fit,
+    "ptm_formats": ptm_choices.run_formats,
+    "ptm_lights": ptm_choices.run_lights,
+    "ptm_peers": ptm_peers.run,
 }
 
 

@@ -7,7 +7,7 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +27,17 @@ from impostor.ptm import Polynomials, evaluate, quantise
 from impostor.ptm.normals import normals
 from impostor.srgb import linear_from_srgb
 
+Lit = tuple[Photographs, NDArray[np.float64]]  # photographs, and (lu, lv) of each
+
 SETS = ("Object1/material1", "Object1/material4", "Object2/material2")
 WIDTH, HEIGHT = 1920, 1280
+STORED: tuple[tuple[str, dict[str, Any], tuple[str, ...]], ...] = (
+    ("gray objects", {}, ("lrgb", "rgb")),
+    ("in colour", {"color": True}, ("lrgb", "rgb")),
+    ("in colour, 4:2:2", {"color": True, "subsampling": 1}, ("lrgb",)),
+    ("in colour, 4:4:4", {"color": True, "subsampling": 0}, ("lrgb",)),
+    ("in colour, PNG", {"color": True, "suffix": ".png"}, ("lrgb",)),
+)
 WORKERS = os.cpu_count() or 1
 
 
@@ -52,21 +61,21 @@ def run_quality(bench: Workbench) -> Table:
         return table
     for name in SETS:
         say(f"ptm: {name}")
-        dome, test = (_capture(folder / name / part / "dirs.lp") for part in ("Dome", "Test"))
+        dome, test = (capture(folder / name / part / "dirs.lp") for part in ("Dome", "Test"))
         truth = np.asarray(Image.open(folder / name / "Dome" / "normals.png").convert("RGB"), float) / 127.5 - 1
         plain = {kind: fit_ptm(*dome, format=kind) for kind in ("rgb", "lrgb")}
         robust = fit_ptm(*dome, format="lrgb", robust=True)
-        lstsq = _psnr(_lstsq(*dome), test)
+        lstsq = psnr(_lstsq(*dome), test)
         off = {"rgb": _off(plain["rgb"], truth), "robust": _off(robust, truth)}
         values = {
-            "psnr_db": _psnr(plain["rgb"], test),
-            "against_lstsq_db": _psnr(plain["rgb"], test) - lstsq,
+            "psnr_db": psnr(plain["rgb"], test),
+            "against_lstsq_db": psnr(plain["rgb"], test) - lstsq,
             "normals_deg": off["rgb"],
-            "direct_db": _direct_psnr(dome, test),
+            "direct_db": direct_psnr(dome, test),
             "gloss": _gloss(dome[0]),
         }
         table.rows.append(Row(f"{name} rgb", f"{name}, RGB", values, (Bar("against_lstsq_db", ">=", -0.005),)))
-        values = {"psnr_db": _psnr(plain["lrgb"], test), **_files(bench.folder, plain["lrgb"], test)}
+        values = {"psnr_db": psnr(plain["lrgb"], test), **_files(bench.folder, plain["lrgb"], test)}
         bars = (
             Bar("file_loss_db", "<=", 0.05),
             Bar("jpeg_loss_db", "<=", 0.3),
@@ -74,7 +83,7 @@ def run_quality(bench: Workbench) -> Table:
             Bar("prediction_saves", ">=", 0),
         )
         table.rows.append(Row(f"{name} lrgb", f"{name}, LRGB", values, bars))
-        values = {"psnr_db": _psnr(robust, test), "normals_deg": off["robust"]}
+        values = {"psnr_db": psnr(robust, test), "normals_deg": off["robust"]}
         bars = (Bar("normals_deg", "<=", 0.75 * off["rgb"]),)
         table.rows.append(Row(f"{name} robust", f"{name}, LRGB, --robust", values, bars))
     table.notes.append(
@@ -98,14 +107,14 @@ def run_fit(bench: Workbench) -> Table:
         "peak_gb": "`impostor ptm fit`, peak GB",
     }
     table = Table("ptm_fit", f"Fitting photographs of {WIDTH} x {HEIGHT}", columns)
-    for label, color in (("gray objects", False), ("in colour", True)):
-        lp = _large_set(bench.folder / f"photographs_{int(color)}", 49, color)
-        photographs, parameters = _capture(lp)
-        for kind in ("lrgb", "rgb"):
+    for number, (label, settings, kinds) in enumerate(STORED):
+        lp = large_set(bench.folder / f"photographs_{number}", 49, **settings)
+        photographs, parameters = capture(lp)
+        for kind in kinds:
             say(f"ptm_fit: {label}, {kind}")
             jobs = (lambda each=photographs: _decode(each), _fit_job(photographs, parameters, kind))
             times = alternate(*jobs, repeats=5, warm_up=1)
-            cost = run_fresh(_fit_command(lp, bench.folder / "a.ptm", kind))
+            cost = run_fresh(fit_command(lp, bench.folder / "a.ptm", kind))
             values = {
                 "photographs": 49,
                 "decode_s": times.median(0),
@@ -116,29 +125,33 @@ def run_fit(bench: Workbench) -> Table:
             }
             bars = (Bar("ratio", "<=", 1.6), Bar("peak_gb", "<", 0.6))
             table.rows.append(Row(f"{label} {kind}", f"{label}, {kind.upper()}", values, bars))
-    lp = _large_set(bench.folder / "photographs_many", 500, False)
-    cost = run_fresh(_fit_command(lp, bench.folder / "a.ptm", "lrgb"))
+    lp = large_set(bench.folder / "photographs_many", 500)
+    cost = run_fresh(fit_command(lp, bench.folder / "a.ptm", "lrgb"))
     peak = None if cost.peak_bytes is None else cost.peak_bytes / 1e9
     before = table.rows[0].values["peak_gb"]
     bars = () if before is None else (Bar("peak_gb", "<=", before * 1.05),)
     table.rows.append(Row("500", "gray objects, LRGB", {"photographs": 500, "peak_gb": peak}, bars))
     table.notes.append(
-        f"JPEGs, sets of 320 x 320 tiled to {WIDTH} x {HEIGHT}; {WORKERS} threads for both. Decoding gives NumPy "
-        "arrays, as the fit needs them; fitting does that, too. Peak memory is the command's, in a fresh process."
+        f"Sets of 320 x 320 tiled to {WIDTH} x {HEIGHT}, JPEGs with colour at half size (4:2:0) unless it says "
+        f"otherwise; {WORKERS} threads for both. Decoding gives NumPy arrays, as the fit needs them; fitting does "
+        "that, too. Peak memory is the command's, in a fresh process."
     )
     return table
 
 
-def _capture(lp: Path) -> tuple[Photographs, NDArray[np.float64]]:
-    capture = read_lp(lp)
-    return open_photographs(capture.photographs), light_parameters(capture)
+def capture(lp: Path) -> Lit:
+    """The photographs that an `.lp` file names, and their lights."""
+    found = read_lp(lp)
+    return open_photographs(found.photographs), light_parameters(found)
 
 
-def _psnr(polynomials: Polynomials, test: tuple[Photographs, NDArray[np.float64]]) -> float:
+def psnr(polynomials: Polynomials, test: Lit) -> float:
+    """Of a fit, against photographs it was not given."""
     return score(lambda u, v: evaluate(polynomials, u, v), polynomials.size, *test, WORKERS).psnr_db
 
 
-def _direct_psnr(dome: tuple[Photographs, NDArray[np.float64]], test: tuple[Photographs, NDArray[np.float64]]) -> float:
+def direct_psnr(dome: Lit, test: Lit) -> float:
+    """Of the photographs themselves, blended, against others."""
     photographs, triangulation = dome[0], LightTriangulation(dome[1])
     return score(lambda u, v: render_direct(photographs, triangulation, u, v), photographs.size, *test, WORKERS).psnr_db
 
@@ -168,25 +181,27 @@ def _off(polynomials: Polynomials, truth: NDArray[np.float64]) -> float:
     return float(np.degrees(np.arccos(np.clip(cosine[known], -1, 1))).mean())
 
 
-def _files(folder: Path, polynomials: Polynomials, test: tuple[Photographs, NDArray[np.float64]]) -> dict[str, float]:
+def _files(folder: Path, polynomials: Polynomials, test: Lit) -> dict[str, float]:
     ptm, path = quantise(polynomials), folder / "a.ptm"
     raw = write_ptm(ptm, path, force=True)
-    whole, stored = _psnr(polynomials, test), _psnr(read_ptm(path).polynomials(), test)
+    whole, stored = psnr(polynomials, test), psnr(read_ptm(path).polynomials(), test)
     bare = write_ptm(ptm, path, compression="jpeg", quality=95, predict=False, force=True)
     small = write_ptm(ptm, path, compression="jpeg", quality=95, force=True)
     return {
         "file_loss_db": whole - stored,
-        "jpeg_loss_db": stored - _psnr(read_ptm(path).polynomials(), test),
+        "jpeg_loss_db": stored - psnr(read_ptm(path).polynomials(), test),
         "jpeg_smaller": raw / small,
         "prediction_saves": 100 * (1 - small / bare),
     }
 
 
-def _large_set(folder: Path, count: int, color: bool) -> Path:
-    """JPEGs of WIDTH x HEIGHT: the real sets tiled, or the sample set where they are not at hand."""
+def large_set(
+    folder: Path, count: int, color: bool = False, part: str = "Dome", suffix: str = ".jpg", **save: Any
+) -> Path:
+    """Photographs of WIDTH x HEIGHT: the real sets tiled, or the sample set where they are not at hand."""
     folder.mkdir(exist_ok=True)
     real = DATA / "rti" / "synthrti"
-    files = [real / name / "Dome" / "dirs.lp" for name in SETS] if real.is_dir() else []
+    files = [real / name / part / "dirs.lp" for name in SETS] if real.is_dir() else []
     sources = [read_lp(path) for path in files or [SAMPLES / "relief" / "rosette.lp"]]
     tint = np.array([1.0, 0.8, 0.6]) if color else np.ones(3)
     paths = []
@@ -198,8 +213,8 @@ def _large_set(folder: Path, count: int, color: bool) -> Path:
             row, column = divmod(place, -(-WIDTH // side))
             picture.paste(tiles[place % len(tiles)], (column * side, row * side))
         pixels = Image.fromarray(np.rint(np.asarray(picture) * tint).astype(np.uint8))
-        paths.append(folder / f"{index:03d}.jpg")
-        pixels.save(paths[-1], quality=92)
+        paths.append(folder / f"{index:03d}{suffix}")
+        pixels.save(paths[-1], quality=92, **save)
     directions = sources[0].directions[np.arange(count) % len(sources[0].directions)]
     write_lp(
         replace(cast(CaptureSet, sources[0]), photographs=tuple(paths), directions=directions), folder / "a.lp", True
@@ -217,17 +232,7 @@ def _fit_job(photographs: Photographs, parameters: NDArray[np.float64], kind: st
     return lambda: fit_ptm(photographs, parameters, format=kind, workers=WORKERS)
 
 
-def _fit_command(lp: Path, output: Path, kind: str) -> list[str]:
-    return [
-        sys.executable,
-        str(COMMAND),
-        "ptm",
-        "fit",
-        str(lp),
-        "-o",
-        str(output),
-        "--format",
-        kind,
-        "--force",
-        "--quiet",
-    ]
+def fit_command(lp: Path, output: Path, kind: str, *more: str) -> list[str]:
+    """`impostor ptm fit`, to be run in a process of its own."""
+    command = [sys.executable, str(COMMAND), "ptm", "fit", str(lp), "-o", str(output)]
+    return [*command, "--format", kind, *more, "--force", "--quiet"]

@@ -61,26 +61,23 @@ def table(results: dict[str, Any]) -> str:
     return "\n".join(["| | |", "|---|---|", *(f"| {label} | {text} |" for label, text in lines)]) + "\n"
 
 
-# Measured once, on another day, on two cores: 24 synthetic objects tiled to 1920 x 1280, 49 lights.
-PEERS = {
-    "relight, ptm (C++)": 0.24,
-    "relight, lptm": 0.34,
-    "relight, rbf18": 0.18,
-    "relight, bilinear18": 0.11,
-    "PTMGenerator (Python), LRGB": 1.26,
-    "NumPy least squares in memory, RGB, nothing written": 1.43,
-}
-
-
 def ptm_table(results: dict[str, Any]) -> str:
-    """The lines of the table of fitters, as Markdown."""
-    rows = results[MACHINE]["tables"]["ptm_fit"]["rows"]
-    ours = {
-        f"`impostor ptm fit`, {kind.upper()}": 1920 * 1280 / 1e6 / rows[f"gray objects {kind}"]["values"]["fit_s"]
-        for kind in ("lrgb", "rgb")
-    }
-    lines = [f"| {name} | {speed:.2f} |" for name, speed in sorted({**PEERS, **ours}.items(), key=lambda row: row[1])]
-    return "\n".join(["| fitter | megapixels of PTM a second |", "|---|---:|", *lines]) + "\n"
+    """The lines of the tables of formats, of lights and of fitters, as Markdown."""
+    formats, lights, peers = (results[MACHINE]["tables"][f"ptm_{name}"] for name in ("formats", "lights", "peers"))
+    lines = [f"| format | {' | '.join(formats['columns'].values())} |", "|---|" + "---:|" * len(formats["columns"])]
+    for row in formats["rows"].values():
+        cells = (_cell(row["values"].get(key), ".1f") for key in formats["columns"])
+        lines.append(f"| {row['label']} | {' | '.join(cells)} |")
+    lines += ["", f"| lights | {' | '.join(lights['rows'])} |", "|---|" + "---:|" * len(lights["rows"])]
+    for key, label in lights["columns"].items():
+        cells = (_cell(row["values"][key], ".1f") for row in lights["rows"].values())
+        lines.append(f"| {label} | {' | '.join(cells)} |")
+    shown = {"seconds": ".1f", "speed": ".2f", "psnr_db": "+.2f", "planes": ".0f", "megabytes": ".1f"}
+    lines += ["", f"| fitter | {' | '.join(peers['columns'][key] for key in shown)} |", "|---|" + "---:|" * len(shown)]
+    for row in peers["rows"].values():
+        cells = (_cell(row["values"][key], digits) for key, digits in shown.items())
+        lines.append(f"| {row['label']} | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
 
 
 def walk_table(results: dict[str, Any]) -> str:
@@ -112,6 +109,10 @@ def rooms_table(results: dict[str, Any]) -> str:
             label = row["label"].replace(", far", "")
             lines.append(f"| {label} | {far:.1f} | {box:.1f} |")
     return "\n".join(lines) + "\n"
+
+
+def _cell(value: float | None, digits: str) -> str:
+    return "" if value is None else f"{value:{digits}}"
 
 
 def _share(values: dict[str, float], scene: str) -> str:

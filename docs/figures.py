@@ -3,8 +3,9 @@
 Figures 3, 5a, 5b, 6b, 9 and 10 are counterparts of those in Dinh, Metoyer, Turk, "Real-Time Lighting Changes for
 Image-Based Rendering"; those named `ptm_...` of figures in HPL-98-131 and HPL-2004-225, those
 named `room_...` of GPU Gems, chapter 19; `hero` and `compare` are the
-README's. All are made from sample_models by the project itself, but for `ptm_photographs`, which
-needs the real photographs and is not kept here: their licence wants a notice that is not at hand.
+README's. All are made from sample_models by the project itself, but for those that end in
+`photographs`: they need real captures and are not kept here, because the licence of those
+wants a notice that is not at hand, or is not stated.
 """
 
 from __future__ import annotations
@@ -19,7 +20,16 @@ import numpy as np
 from PIL import Image
 
 from docs.figure_layers import figure_3, figure_5a, figure_5b, figure_6b
-from docs.figure_ptm import ptm_direct, ptm_dome, ptm_lights, ptm_normals, ptm_photographs, ptm_quilt
+from docs.figure_ptm import (
+    ptm_direct,
+    ptm_direct_photographs,
+    ptm_dome,
+    ptm_lights,
+    ptm_lights_photographs,
+    ptm_normals,
+    ptm_photographs,
+    ptm_quilt,
+)
 from docs.figure_rooms import room_day, room_localised, room_materials, room_shapes, room_sky, room_study
 from docs.figure_scenes import compare, figure_9, figure_10, hero
 from docs.studio import Studio
@@ -28,7 +38,8 @@ from impostor.files.output import atomic_output
 FIGURES: dict[str, Callable[[Studio], Image.Image | None]] = {
     figure.__name__: figure
     for figure in (figure_3, figure_5a, figure_5b, figure_6b, figure_9, figure_10, hero, compare)
-    + (ptm_dome, ptm_direct, ptm_lights, ptm_normals, ptm_quilt, ptm_photographs)
+    + (ptm_dome, ptm_direct, ptm_lights, ptm_normals, ptm_quilt)
+    + (ptm_photographs, ptm_direct_photographs, ptm_lights_photographs)
     + (room_study, room_localised, room_materials, room_shapes, room_day, room_sky)
 }
 FOLDER = Path(__file__).with_name("figures")

@@ -12,7 +12,6 @@ from io import BytesIO
 from itertools import pairwise
 from os import PathLike
 
-import networkx
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
@@ -202,6 +201,8 @@ def _choose_references(planes: Sequence[Plane], quality: int) -> list[Reference]
     ]
     with ThreadPoolExecutor(THREADS) as pool:
         sizes = dict(zip(choices, pool.map(bytes_of, choices), strict=True))
+    import networkx  # takes half of the time that a command needs to start
+
     graph = networkx.DiGraph()
     for plane, reference, _ in choices:
         inverted = reference >= 0 and sizes[plane, reference, True] < sizes[plane, reference, False]

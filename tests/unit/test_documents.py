@@ -69,3 +69,14 @@ def test_what_the_method_says_of_the_dragon_is_measured():
     at = [round(rows[f"dragon/{degrees}"]["values"]["psnr_db"]) for degrees in (0, 5, 20)]
     said = f"the dragon falls from {at[0]} dB to {at[1]} at 5 degrees and to {at[2]} at 20"
     assert said in " ".join((ROOT / "docs/method.md").read_text().split())
+
+
+def test_what_the_page_on_ptms_says_of_robust_fits_is_measured():
+    rows = json.loads(readme_table.RESULTS.read_text())[readme_table.MACHINE]["tables"]["ptm"]["rows"]
+    values = {key: row["values"] for key, row in rows.items()}
+    sets = {key.rsplit(" ", 1)[0] for key in rows}
+    off = [100 * (1 - values[f"{name} robust"]["normals_deg"] / values[f"{name} rgb"]["normals_deg"]) for name in sets]
+    decibels = [values[f"{name} robust"]["psnr_db"] - values[f"{name} lrgb"]["psnr_db"] for name in sets]
+    text = " ".join((ROOT / "docs/ptm.md").read_text().split())
+    assert f"takes {min(off):.0f} to {max(off):.0f} percent off their error" in text
+    assert f"changes the PSNR by {min(decibels):.1f} to {max(decibels):+.1f} dB" in text

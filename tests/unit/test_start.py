@@ -28,6 +28,12 @@ def test_listing_the_commands_imports_nothing_heavy():
     assert not heavy & set(modules.stdout.split())
 
 
+def test_a_ptm_file_that_is_not_compressed_needs_no_graphs():
+    listed = "import sys, impostor.files.ptm_file; print(*sys.modules)"
+    modules = subprocess.run([sys.executable, "-c", listed], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert not {"networkx", "scipy"} & set(modules.stdout.split())
+
+
 def test_ctrl_c_while_modules_are_imported_is_one_line(tmp_path):
     (tmp_path / "typer.py").write_text("import time\nprint('ready', flush=True)\ntime.sleep(60)\n")
     command = [sys.executable, "-m", "impostor", "info", "a.fan"]
