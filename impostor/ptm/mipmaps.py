@@ -30,7 +30,7 @@ def mip_maps(polynomials: Polynomials) -> list[Polynomials]:
     A value is linear in the coefficients, so that RGB and LUM filter exactly. LRGB is a product, and a mean of
     products is no product. What is filtered is therefore the products' three polynomials; each texel of each level
     then takes the luminance and color whose product differs least from them, in mean square over all light
-    directions. `tests/unit/test_ptm_mipmaps.py` measures what that gains over filtering luminance and color apart.
+    directions. `tests/unit/ptm/test_ptm_mipmaps.py` measures what that gains over filtering luminance and color apart.
 
     References
     ----------

@@ -13,8 +13,8 @@ import pytest
 from impostor.errors import ModelError, ModelWarning
 from impostor.model import load_model
 from tests.data import DATA, needs_data
-from tests.unit.gltf_builder import TRIANGLE, GltfBuilder, encoded, glb
-from tests.unit.test_model import DAE, MESH_3MF, QUARTERS, stl, write_3mf, write_textured_obj
+from tests.unit.importing.gltf_builder import TRIANGLE, GltfBuilder, encoded, glb
+from tests.unit.importing.test_model import DAE, MESH_3MF, QUARTERS, stl, write_3mf, write_textured_obj
 
 PLY = (
     "ply\nformat {} 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"

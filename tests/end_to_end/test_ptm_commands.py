@@ -149,7 +149,7 @@ def test_capture_keeps_the_picture_that_it_photographs(capsys, tmp_path):
 
 
 def test_lights_of_a_ball_become_a_capture_set(capsys, tmp_path):
-    from tests.unit.test_chrome_ball import BALL, drawn_ball
+    from tests.unit.bake.test_chrome_ball import BALL, drawn_ball
 
     truth = np.array([[0.5, 0, 0.866], [0, 0.6, 0.8], [-0.4, -0.3, 0.866]])
     truth /= np.linalg.norm(truth, axis=1, keepdims=True)
@@ -233,7 +233,7 @@ def test_a_light_that_is_no_light_is_refused(capsys, tmp_path, lp, light):
 
 
 def test_lights_that_fit_would_refuse_are_not_written(capsys, tmp_path):
-    from tests.unit.test_chrome_ball import BALL, drawn_ball
+    from tests.unit.bake.test_chrome_ball import BALL, drawn_ball
 
     lights = np.array([[0.5, 0, 0.866], [0.8, 0, -0.6]])
     lights /= np.linalg.norm(lights, axis=1, keepdims=True)

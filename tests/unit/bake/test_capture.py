@@ -340,7 +340,7 @@ def test_without_opengl_the_error_says_what_to_install():
 def test_leaving_without_release_is_silent():
     done = run(
         "import numpy as np\n"
-        "from tests.unit.test_capture import Capture, SIZE, front, model, quad\n"
+        "from tests.unit.bake.test_capture import Capture, SIZE, front, model, quad\n"
         "capturing = Capture(model(quad(-1, -1, 1, 1)), SIZE)\n"
         "print(capturing.view(front()).color[0, 0, 3])\n"
     )

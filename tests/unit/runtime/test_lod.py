@@ -1,7 +1,6 @@
 """Level of detail: who is a mesh and who a fan, and how one becomes the other without a gap, a pop or a flicker."""
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +20,7 @@ from runtime.instances.instances import Instances
 from runtime.viewing.cameras import Camera
 from runtime.viewing.viewer import Viewer
 from tests import gl as raw
+from tests.data import SAMPLES
 from tests.gl import gl
 from tests.pictures import apart, filling, looking
 from tests.solids import BLUE, RED, Box, Sphere, solid_fan, solid_model
@@ -29,7 +29,7 @@ BALL = Sphere(color=RED)
 MODEL = solid_model(BALL)
 FAN = solid_fan(BALL, views=8, size=64)
 OTHER = dataclasses.replace(solid_fan(Sphere(color=BLUE), views=8, size=64), name="other")
-STATUE = Path(__file__).resolve().parents[2] / "sample_models" / "statue.glb"
+STATUE = SAMPLES / "statue.glb"
 ALWAYS, NEVER = LevelOfDetail(mesh_above_px=0), LevelOfDetail(np.inf, 180.0)
 HEIGHT = float(np.ptp(FAN.bounds, axis=0).max())
 

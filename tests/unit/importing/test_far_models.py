@@ -13,8 +13,8 @@ from runtime.pictures import PictureSettings, draw_picture, orbit_camera
 from runtime.viewing.cameras import Camera
 from tests.data import SAMPLES
 from tests.end_to_end.commands import write_obj
-from tests.unit.gltf_builder import GltfBuilder
-from tests.unit.test_model import silent, stl
+from tests.unit.importing.gltf_builder import GltfBuilder
+from tests.unit.importing.test_model import silent, stl
 
 FAR = np.array([4.2e6, -300.0, 9e5])
 FEW = {"views": 4, "size": 64}

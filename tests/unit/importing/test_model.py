@@ -10,7 +10,7 @@ import pytest
 from impostor.errors import ModelError, ModelWarning, SettingsError
 from impostor.model import Material, Model, load_model
 from tests.data import DATA, needs_data
-from tests.unit.gltf_builder import TRIANGLE, GltfBuilder, encoded
+from tests.unit.importing.gltf_builder import TRIANGLE, GltfBuilder, encoded
 
 QUARTERS = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [255, 255, 255]]], np.uint8)
 CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)

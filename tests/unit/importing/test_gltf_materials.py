@@ -12,7 +12,7 @@ from impostor.model import load_model
 from impostor.views import View
 from tests.data import DATA, needs_data
 from tests.pictures import filling
-from tests.unit.gltf_builder import GltfBuilder, encoded
+from tests.unit.importing.gltf_builder import GltfBuilder, encoded
 
 REPEAT, CLAMP, MIRROR = 10497, 33071, 33648
 # Red and green columns above blue and white ones, large enough that their middles are free of their neighbours.

@@ -23,7 +23,7 @@ from runtime.meshes.bump import Bump
 from tests.data import SAMPLES
 from tests.pictures import apart, filling, placed
 from tests.solids import Sphere, solid_model
-from tests.unit.gltf_builder import GltfBuilder, encoded
+from tests.unit.importing.gltf_builder import GltfBuilder, encoded
 
 SQUARE = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], "f4")
 FACES = np.array([[0, 1, 2], [0, 2, 3]])

@@ -10,7 +10,7 @@ from runtime.gl.canvas import Canvas
 from runtime.stage.stage import Stage
 from runtime.walk.walker import Walker
 from tests.solids import Box, solid_model
-from tests.unit.test_stage import HIGH, LOW, bluish, reddish, write_ply
+from tests.unit.walk.test_stage import HIGH, LOW, bluish, reddish, write_ply
 
 SCENE = """
 ambient = 0

@@ -11,8 +11,8 @@ from runtime.gl import programs
 from runtime.renderer import ImpostorRenderer
 from runtime.stage.overdraw import OverdrawPass
 from runtime.walk.overlay import Overlay
+from tests.data import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("impostor", "bake", "runtime")
 FILES = {path.relative_to(ROOT).as_posix(): path for package in PACKAGES for path in ROOT.glob(f"{package}/**/*.py")}
 MOST_LINES = 450
