@@ -35,6 +35,7 @@ from runtime.meshes.mesh_pass import OUTPUTS, MeshPass
 from runtime.placed import Placed
 from runtime.rooms.environments import RoomTable, check_rooms
 from runtime.rooms.room_pass import RoomPass, number_of, to_show
+from runtime.shadows.casters import Casting
 from runtime.shadows.receiver import Receiver
 from runtime.shadows.shadow_pass import ShadowPass
 from runtime.surfaces.surface_pass import Surface, SurfacePass
@@ -385,6 +386,8 @@ class ImpostorRenderer(LightSettings, FanSettings):
         SettingsError
             A surface that is not flat, or not in this renderer.
         """
+        if surface is not None:
+            check_type("surface", surface, GroundSurface)
         placed = self._placed
         if isinstance(ground, Surface):
             if not placed.holds(ground):
@@ -393,12 +396,9 @@ class ImpostorRenderer(LightSettings, FanSettings):
         else:
             check_type("ground", ground, Ground, " or a Surface")
             receiver = Receiver(ground)
-        if surface is not None:
-            check_type("surface", surface, GroundSurface)
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
-            surfaces = [placed.casting(each) for each in placed.surfaces]
-            casters = placed.batches, placed.visible_meshes, surfaces
-            self._shadows.draw(state, *casters, viewer, self, receiver, surface)
+            casting = Casting(placed.batches, placed.visible_meshes, [placed.casting(each) for each in placed.surfaces])
+            self._shadows.draw(state, casting, viewer, self, receiver, surface)
 
     @contextmanager
     def _frame(self, clip_from_view: ArrayLike, view_from_world: ArrayLike) -> Iterator[tuple[CallerState, Viewer]]:

@@ -18,7 +18,7 @@ def box_corners(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[
 
 
 def shadow_hulls(
-    corners: NDArray[np.float64], clip_from_shadow: NDArray[np.float64], light: DirectionalLight, ground: Ground
+    corners: NDArray[np.float64], world_from_shadow: NDArray[np.float64], light: DirectionalLight, ground: Ground
 ) -> NDArray[np.float64]:
     """Points whose hulls hold the shadows of boxes.
 
@@ -26,42 +26,33 @@ def shadow_hulls(
     ----------
     corners : ndarray, (N, 8, 3) float64
         Of the boxes, world space.
-    clip_from_shadow : ndarray, (N, 4, 4) float64
-        From the true shadow on the ground to the clip space in which it is shown.
+    world_from_shadow : ndarray, (N, 4, 4) float64
+        From the true shadow on the ground to where it is shown, homogeneous.
     light : DirectionalLight
     ground : Ground
 
     Returns
     -------
     ndarray, (N, 8 or 16, 4) float64
-        Clip space. The corners' shadows; where a box reaches under the ground also the places above them, because
-        what is buried goes there (`along_light`).
+        World space, homogeneous. The corners' shadows; where a box reaches under the ground also the places above
+        them, because what is buried goes there (`along_light`).
     """
     toward = np.array(light.toward)
     height = (corners @ ground.normal - ground.offset)[..., None]
     points = corners - height * (toward / (ground.normal @ toward))
     if height.size and height.min() < 0:
         points = np.concatenate([points, corners - height * ground.normal], axis=1)
-    return points @ clip_from_shadow[:, :, :3].swapaxes(1, 2) + clip_from_shadow[:, None, :, 3]
+    return points @ world_from_shadow[:, :, :3].swapaxes(1, 2) + world_from_shadow[:, None, :, 3]
 
 
 def in_view(hulls: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which hulls (N, K, 4), clip space, may reach into the picture: not all of their points beyond one clip plane."""
+    """Which hulls (N, K, 4), clip space, may reach into the picture: not all of their points beyond one clip plane.
+
+    So, too, which may reach into any box, in a space where it lies between -1 and 1.
+    """
     w = hulls[..., 3:]
     beyond = np.concatenate([hulls[..., :3] > w, hulls[..., :3] < -w], axis=-1)
     return ~np.any(np.all(beyond, axis=1), axis=-1)
-
-
-def window_around(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """From clip space (4, 4) to that of a window around points (N, 4), clip space; the whole picture's at most."""
-    w = corners[:, 3:]
-    if (w <= 1e-9).any():
-        return np.eye(4)
-    low, high = (np.clip(edge(corners[:, :2] / w, axis=0), -1, 1) for edge in (np.min, np.max))
-    scale = 2 / np.maximum(high - low, 1e-6)
-    window = np.diag([*scale, 1.0, 1.0])
-    window[:2, 3] = -scale * (low + high) / 2
-    return window
 
 
 def covered_cells(hulls: NDArray[np.float64], width: int, height: int) -> NDArray[np.intp]:

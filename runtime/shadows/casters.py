@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,20 +30,19 @@ class Casters:
     copies : CastingFan or MeshCopies
     corners : ndarray, (N, 8, 3) float64
         Of their bounding boxes, world space.
-    clip_from_shadow : tuple of ndarray, (N or 1, 4, 4) float64
+    world_from_shadow : tuple of ndarray, (N or 1, 4, 4) float64
         From the true shadow: to where it may be seen.
+    clip_from_world : ndarray, (4, 4) float64
     receiver : Receiver
-    window : ndarray, (4, 4) float64
-        `Receiver.window`.
     stand : bool
         Whether they darken what is around their feet.
     """
 
     copies: CastingFan | MeshCopies
     corners: NDArray[np.float64]
-    clip_from_shadow: tuple[NDArray[np.float64], ...]
+    world_from_shadow: tuple[NDArray[np.float64], ...]
+    clip_from_world: NDArray[np.float64]
     receiver: Receiver
-    window: NDArray[np.float64]
     stand: bool = True
 
     @property
@@ -53,10 +53,13 @@ class Casters:
     def shadows(self, lights: Sequence[DirectionalLight]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Which copies (M,) cast what may be seen, and hulls (M, K, 4) of their shadows from all lights, clip space."""
         ground = self.receiver.ground
-        hulls = [shadow_hulls(self.corners, each, light, ground) for light in lights for each in self.clip_from_shadow]
+        hulls = [shadow_hulls(self.corners, each, light, ground) for light in lights for each in self.world_from_shadow]
         hull = np.concatenate(hulls, axis=1)
-        chosen = np.flatnonzero(self._in_front & in_view(hull @ self.window.T))
-        return chosen, hull[chosen]
+        seen = hull @ self.clip_from_world.T
+        chosen = self._in_front & in_view(seen)
+        if self.receiver.mesh is not None:
+            chosen &= in_view(hull @ self.receiver.box_from_world.T)
+        return np.flatnonzero(chosen), seen[chosen]
 
     @property
     def _in_front(self) -> NDArray[np.bool_]:
@@ -66,34 +69,40 @@ class Casters:
         return heights.max(axis=1) > (-FLUSH if self.stand else FLUSH) * size
 
 
-def casters_for(
-    receiver: Receiver,
-    viewer: Viewer,
-    fans: Sequence[Batch],
-    meshes: Sequence[MeshInstance],
-    surfaces: Sequence[MeshInstance],
-) -> list[Casters]:
-    """All that can cast on a receiver.
+class Casting(NamedTuple):
+    """Everything that casts shadows; surfaces cast as meshes do, and have no feet."""
 
-    Parameters
-    ----------
-    receiver : Receiver
-    viewer : Viewer
-    fans : sequence of Batch
-    meshes : sequence of MeshInstance
-    surfaces : sequence of MeshInstance
-        They cast as meshes do, and have no feet.
-    """
-    clip, ground, window = viewer.clip_from_world, receiver.ground, receiver.window(viewer)
+    fans: Sequence[Batch]
+    meshes: Sequence[MeshInstance]
+    surfaces: Sequence[MeshInstance]
+
+    def __bool__(self) -> bool:
+        return any(map(len, self))
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """Equal while all of it stands as it stood."""
+        return (
+            *((*fan.instances.key, fan.levels and fan.levels.key) for fan in self.fans),
+            *(
+                (id(mesh.buffers), np.asarray(mesh.world_from_model, float).tobytes())
+                for mesh in (*self.meshes, *self.surfaces)
+            ),
+        )
+
+
+def casters_for(receiver: Receiver, viewer: Viewer, casting: Casting) -> list[Casters]:
+    """All that can cast on a receiver, as a viewer sees it."""
+    clip, ground, itself = viewer.clip_from_world, receiver.ground, np.eye(4)[None]
     found = []
-    for fan in fans:
+    for fan in casting.fans:
         cast = CastingFan.of(fan.instances, viewer, ground, fan.levels and fan.levels.fan_share)
         # The shadow of a fan lies between where it meets the picture's feet and where the light casts it.
-        between = clip @ cast.records["rows"].astype(float), clip[None]
-        found.append(Casters(cast, cast.corners(), between, receiver, window))
-    for stand, given in ((True, meshes), (False, surfaces)):
+        between = cast.records["rows"].astype(float), itself
+        found.append(Casters(cast, cast.corners(), between, clip, receiver))
+    for stand, given in ((True, casting.meshes), (False, casting.surfaces)):
         found += [
-            Casters(copies, mesh_corners(copies), (clip[None],), receiver, window, stand)
+            Casters(copies, mesh_corners(copies), (itself,), clip, receiver, stand)
             for copies in MeshCopies.gathered(given)
         ]
     return found

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from impostor.shadow_projection import Ground
 from runtime.meshes.copies import MeshCopies, MeshInstance
-from runtime.shadows.bounds import window_around
-from runtime.shadows.meshes import mesh_corners
 from runtime.surfaces.surface_pass import Surface
 from runtime.viewing.viewer import Viewer
 
@@ -46,18 +45,25 @@ class Receiver:
         (copies,) = MeshCopies.gathered([mesh])
         return cls(surface.plane(), copies, id(surface))
 
-    def faces(self, viewer: Viewer) -> bool:
-        """Whether a viewer sees the lit side."""
-        return bool(self.ground.plane @ viewer.eye > 0)
+    def seen_by(self, viewer: Viewer) -> bool:
+        """Whether a viewer may see it, and from the lit side."""
+        in_view = self.mesh is None or bool(viewer.sees(*self.mesh.spheres).any())
+        return in_view and bool(self.ground.plane @ viewer.eye > 0)
 
     @property
     def stood_on(self) -> bool:
         """Whether things have their feet on it."""
         return self.mesh is None or bool(self.ground.normal[1] > UPRIGHT)
 
-    def window(self, viewer: Viewer) -> NDArray[np.float64]:
-        """(4, 4): from clip space to that of the part of the picture which the receiver can be in."""
-        if self.mesh is None:
-            return np.eye(4)
-        corners = mesh_corners(self.mesh)[0]
-        return window_around(corners @ viewer.clip_from_world[:, :3].T + viewer.clip_from_world[:, 3])
+    @cached_property
+    def box_from_world(self) -> NDArray[np.float64]:
+        """(4, 4): to where the mesh lies between -1 and 1 along two axes of the plane."""
+        assert self.mesh is not None
+        matrix, model = self.mesh.world_from_model[0], self.mesh.buffers.model
+        low, high = model.bounds
+        half = np.where(high > low, (high - low) / 2, 1.0)
+        box = np.diag([*(1 / half), 1.0]) @ np.linalg.inv(matrix)
+        box[:3, 3] -= (low + high) / 2 / half
+        # The axis along the normal does not count.
+        box[np.abs(box[:3, :3] @ self.ground.normal * half).argmax()] = 0
+        return box

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import moderngl
-import numpy as np
 
 from impostor.fan import Fan
-from runtime.fans.batch import Batch
 from runtime.gl.state import CallerState
 from runtime.ground.ground_light import BrightLights, ground_light
 from runtime.ground.ground_pass import GroundSurface
 from runtime.lights.settings import LightSettings
-from runtime.meshes.copies import MeshInstance
-from runtime.shadows.casters import casters_for
+from runtime.shadows.casters import Casting, casters_for
 from runtime.shadows.darkening import MOST_LIGHTS, DarkeningPass
 from runtime.shadows.marks import CHANNELS, Mark, MarkPass, Marks
 from runtime.shadows.receiver import Receiver
@@ -40,9 +37,7 @@ class ShadowPass:
     def draw(
         self,
         state: CallerState,
-        fans: Sequence[Batch],
-        meshes: Sequence[MeshInstance],
-        surfaces: Sequence[MeshInstance],
+        casting: Casting,
         viewer: Viewer,
         settings: LightSettings,
         receiver: Receiver,
@@ -53,7 +48,7 @@ class ShadowPass:
         Depth is tested against what is drawn and not written. A viewer who is not above the plane sees no shadow.
         Shadows on the ground fade with its surface, where there is one.
         """
-        if not receiver.faces(viewer) or not (len(fans) or len(meshes) or len(surfaces)):
+        if not casting or not receiver.seen_by(viewer):
             return
         sources = self._sources(settings, viewer, receiver)
         if not sources:
@@ -62,12 +57,12 @@ class ShadowPass:
         pictures = self._ctx.info["GL_MAX_TEXTURE_SIZE"] // (viewer.size[1] + 1)
         at_once = min(MOST_LIGHTS, CHANNELS * max(pictures, 1))
         batches = [sources[start : start + at_once] for start in range(0, len(sources), at_once)]
-        frame = _frame_key(fans, [*meshes, *surfaces], viewer, sources, receiver)
+        frame = (viewer.key, tuple(mark.key for mark in sources), receiver.ground.plane.tobytes(), *casting.key)
         if frame == marks.frame:
-            self._darkening.draw(state, marks, batches[0], receiver, viewer, surface)
+            self._darkening.draw(state, marks, sources, receiver, viewer, surface)
             return
         marks.frame = None
-        casters = casters_for(receiver, viewer, fans, meshes, surfaces)
+        casters = casters_for(receiver, viewer, casting)
         for batch in batches:
             self._mark_pass.draw(marks, batch, casters, viewer, receiver.ground)
             self._darkening.draw(state, marks, batch, receiver, viewer, surface)
@@ -102,20 +97,3 @@ class ShadowPass:
         for part in (*self._marks.values(), self._mark_pass, self._darkening):
             part.release()
         self._marks.clear()
-
-
-def _frame_key(
-    fans: Sequence[Batch],
-    meshes: Sequence[MeshInstance],
-    viewer: Viewer,
-    sources: Sequence[Mark],
-    receiver: Receiver,
-) -> tuple[object, ...]:
-    """Equal for two frames that hold the same marks."""
-    return (
-        viewer.key,
-        tuple(mark.key for mark in sources),
-        receiver.ground.plane.tobytes(),
-        *((*fan.instances.key, fan.levels and fan.levels.key) for fan in fans),
-        *((id(mesh.buffers), np.asarray(mesh.world_from_model, float).tobytes()) for mesh in meshes),
-    )
