@@ -28,7 +28,7 @@ class Casters:
     ----------
     copies : CastingFan or MeshCopies
     corners : ndarray, (N, 8, 3) float64
-        Of their bounding boxes, world space.
+        Of their bounding boxes, world space; those of a flat mesh lie in its plane.
     clip_from_shadow : tuple of ndarray, (N or 1, 4, 4) float64
         From the true shadow: to where it may be seen.
     receiver : Receiver

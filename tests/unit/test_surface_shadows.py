@@ -5,9 +5,11 @@ import pytest
 
 from impostor.errors import SettingsError
 from impostor.lighting import DirectionalLight
+from impostor.model import Model
 from impostor.ptm.polynomials import Polynomials
 from impostor.ptm.quantise import quantise
 from impostor.shadow_projection import Ground
+from impostor.views import rotation_about_y
 from runtime import ContactShadows, ImpostorRenderer, Offscreen
 from runtime.ground.ground_pass import GroundSurface
 from runtime.surfaces.surface_pass import lying_on, rectangle
@@ -83,6 +85,18 @@ class TestOnAWall:
     def test_neither_does_it_on_itself_nor_what_goes_on_beside_it(self, renderer, wall, picture):
         renderer.add_surface(GREY, rectangle(1, 1), world_from_model=placed((1.2, 0, 0)))
         np.testing.assert_array_equal(picture(wall), picture())
+
+    def test_neither_does_a_model_at_a_slant_to_its_own_axes(self, renderer, picture):
+        renderer.lights, renderer.ambient = [SIDE], 0
+        turn = rotation_about_y(0.5) @ rotation_about_y(0.4)[[1, 2, 0]][:, [1, 2, 0]]
+        (flat,) = rectangle(2, 2).primitives
+        slanted = Model.from_arrays(flat.positions @ turn.T, flat.triangles, flat.normals @ turn.T, uvs=flat.uvs)
+        back = np.eye(4)
+        back[:3, :3] = turn.T
+        wall = renderer.add_surface(GREY, slanted, world_from_model=back)
+        np.testing.assert_array_equal(picture(wall), picture())
+        renderer.add_mesh(solid_model(TOWER), placed((0, 0, 0.5)))
+        assert iou(picture(wall).max(axis=-1) == 0, across(-0.9, -0.1)) > 0.9
 
     def test_another_wall_casts_on_it(self, renderer, wall, picture):
         renderer.add_surface(GREY, rectangle(0.2, 1), world_from_model=placed((0.8, 0, 0.8), np.pi / 2))
@@ -164,12 +178,18 @@ class TestOnTheGround:
 
 class TestRefusals:
     def test_a_surface_that_is_not_flat(self, renderer):
-        bent = solid_model(TOWER)
-        bent = renderer.add_surface(GREY, type(bent).from_arrays(
-            [[0, 0, 0], [1, 0, 0], [1, 1, 0.5], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], uvs=np.zeros((4, 2)), name="sail"
-        ))  # fmt: skip
+        corners, faces = [[0, 0, 0], [1, 0, 0], [1, 1, 0.5], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
+        bent = renderer.add_surface(GREY, Model.from_arrays(corners, faces, uvs=np.zeros((4, 2)), name="sail"))
         with pytest.raises(SettingsError, match=r"sail reaches 0\.\d+ m out of a plane; expected a flat model"):
             renderer.draw_shadows(*AHEAD, bent)
+
+    def test_a_sheet_with_two_fronts(self, renderer):
+        corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+        faces, normals = [[0, 1, 2], [3, 5, 4]], [[0, 0, 1]] * 3 + [[0, 0, -1]] * 3
+        sheet = Model.from_arrays(corners * 2, faces, normals, uvs=np.zeros((6, 2)), name="sheet")
+        sheet = renderer.add_surface(GREY, sheet)
+        with pytest.raises(SettingsError, match="sheet faces every way as much as its opposite; expected a flat model"):
+            renderer.draw_shadows(*AHEAD, sheet)
 
     def test_a_surface_of_another_renderer(self, ctx, renderer):
         other = ImpostorRenderer(ctx, cache_side=64)
