@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,12 +56,15 @@ class Casters:
         ground = self.receiver.ground
         hulls = [shadow_hulls(self.corners, each, light, ground) for light in lights for each in self.clip_from_shadow]
         hull = np.concatenate(hulls, axis=1)
-        chosen = np.flatnonzero(self._in_front & in_view(hull @ self.window.T))
+        chosen = np.flatnonzero(self.in_front & in_view(hull @ self.window.T))
         return chosen, hull[chosen]
 
-    @property
-    def _in_front(self) -> NDArray[np.bool_]:
-        """What lies behind the receiver casts nothing on it; nor does a surface in its plane, such as itself."""
+    @cached_property
+    def in_front(self) -> NDArray[np.bool_]:
+        """Which copies (N,) reach out of the receiver's plane to its lit side: others cast nothing on it.
+
+        A surface that lies in the plane, such as the receiver itself, does not.
+        """
         heights = self.corners @ self.receiver.ground.normal - self.receiver.ground.offset
         size = np.abs(self.corners - self.corners[:, :1]).max(axis=(1, 2))
         return heights.max(axis=1) > (-FLUSH if self.stand else FLUSH) * size

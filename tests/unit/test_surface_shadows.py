@@ -175,6 +175,17 @@ class TestOnTheGround:
         assert (apart(picture(floor, self.CAMERA), bare) > 20).any()
         np.testing.assert_array_equal(picture(wall, self.CAMERA), bare)
 
+    @pytest.mark.parametrize("kind", ["mesh", "fan"])
+    def test_what_is_under_it_touches_it_nowhere(self, renderer, picture, kind):
+        """As what stands under a table."""
+        renderer.lights, renderer.ambient, renderer.contact_shadows = [], 0.6, ContactShadows(1.0, 1.0)
+        table = renderer.add_surface(GREY, rectangle(4, 4), world_from_model=lying_on(LEVEL))
+        if kind == "mesh":
+            renderer.add_mesh(solid_model(TOWER), placed((0, -0.6, 0)))
+        else:
+            renderer.add(solid_fan(TOWER, views=8, size=32), (0, -0.6, 0))
+        np.testing.assert_array_equal(picture(table, self.CAMERA), picture(matrices=self.CAMERA))
+
 
 class TestRefusals:
     def test_a_surface_that_is_not_flat(self, renderer):
