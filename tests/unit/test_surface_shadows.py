@@ -14,7 +14,7 @@ from runtime import ContactShadows, ImpostorRenderer, Offscreen
 from runtime.ground.ground_pass import GroundSurface
 from runtime.surfaces.surface_pass import lying_on, rectangle
 from tests.pictures import apart, filling, iou, looking, placed
-from tests.solids import Box, solid_fan, solid_model
+from tests.solids import Box, Sphere, solid_fan, solid_model
 
 SIZE = 128
 LEVEL = Ground((0, 1, 0))
@@ -81,6 +81,20 @@ class TestOnAWall:
         renderer.add_mesh(solid_model(TOWER), placed((0.2, 0, -0.5)))
         renderer.add(solid_fan(TOWER, views=8, size=32), (-0.2, 0, -0.6))
         np.testing.assert_array_equal(picture(wall), picture())
+
+    @pytest.mark.parametrize("softness_deg", [0, 3])
+    @pytest.mark.parametrize("kind", ["mesh", "fan"])
+    def test_what_is_stuck_in_it_casts_with_what_stands_out(self, renderer, wall, picture, kind, softness_deg):
+        """Of a ball a cap, so flat that all of it is lit: nothing is dark but what it stands on."""
+        renderer.lights = [DirectionalLight((1, 0, 1), softness=np.radians(softness_deg))]
+        ball = Sphere((0, 0, 0), 0.5)
+        if kind == "mesh":
+            renderer.add_mesh(solid_model(ball), placed((0, 0, -0.45)))
+        else:
+            renderer.add(solid_fan(ball, views=32, elevation_deg=0, size=128), (0, 0, -0.45))
+        x = (np.arange(SIZE) + 0.5) * 2 / SIZE - 1
+        away = np.hypot(x, x[:, None]) > np.sqrt(0.5**2 - 0.45**2) + 2 / SIZE
+        np.testing.assert_array_equal(picture(wall)[away], picture()[away])
 
     def test_neither_does_it_on_itself_nor_what_goes_on_beside_it(self, renderer, wall, picture):
         renderer.add_surface(GREY, rectangle(1, 1), world_from_model=placed((1.2, 0, 0)))
