@@ -53,11 +53,13 @@ class Casters:
 
     def shadows(self, lights: Sequence[DirectionalLight]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Which copies (M,) cast what may be seen, and hulls (M, K, 4) of their shadows from all lights, clip space."""
-        ground = self.receiver.ground
-        hulls = [shadow_hulls(self.corners, each, light, ground) for light in lights for each in self.clip_from_shadow]
+        ground, front = self.receiver.ground, np.flatnonzero(self.in_front)
+        corners = self.corners[front]
+        places = [each if len(each) == 1 else each[front] for each in self.clip_from_shadow]
+        hulls = [shadow_hulls(corners, place, light, ground) for light in lights for place in places]
         hull = np.concatenate(hulls, axis=1)
-        chosen = np.flatnonzero(self.in_front & in_view(hull @ self.window.T))
-        return chosen, hull[chosen]
+        seen = in_view(hull @ self.window.T)
+        return front[seen], hull[seen]
 
     @cached_property
     def in_front(self) -> NDArray[np.bool_]:

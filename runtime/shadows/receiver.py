@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from impostor.shadow_projection import Ground
 from runtime.meshes.copies import MeshCopies, MeshInstance
-from runtime.shadows.bounds import window_around
+from runtime.shadows.bounds import in_view, window_around
 from runtime.shadows.meshes import mesh_corners
 from runtime.surfaces.surface_pass import Surface
 from runtime.viewing.viewer import Viewer
@@ -46,9 +46,11 @@ class Receiver:
         (copies,) = MeshCopies.gathered([mesh])
         return cls(surface.plane(), copies, id(surface))
 
-    def faces(self, viewer: Viewer) -> bool:
-        """Whether a viewer sees the lit side."""
-        return bool(self.ground.plane @ viewer.eye > 0)
+    def seen_by(self, viewer: Viewer) -> bool:
+        """Whether a viewer may see something of the lit side."""
+        if not self.ground.plane @ viewer.eye > 0:
+            return False
+        return self.mesh is None or bool(in_view(self._corners(viewer)[None])[0])
 
     @property
     def stood_on(self) -> bool:
@@ -59,5 +61,9 @@ class Receiver:
         """(4, 4): from clip space to that of the part of the picture which the receiver can be in."""
         if self.mesh is None:
             return np.eye(4)
-        corners = mesh_corners(self.mesh)[0]
-        return window_around(corners @ viewer.clip_from_world[:, :3].T + viewer.clip_from_world[:, 3])
+        return window_around(self._corners(viewer))
+
+    def _corners(self, viewer: Viewer) -> NDArray[np.float64]:
+        """Of the mesh's bounding box, clip space, (8, 4)."""
+        assert self.mesh is not None
+        return mesh_corners(self.mesh)[0] @ viewer.clip_from_world[:, :3].T + viewer.clip_from_world[:, 3]

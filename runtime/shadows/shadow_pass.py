@@ -53,7 +53,7 @@ class ShadowPass:
         Depth is tested against what is drawn and not written. A viewer who is not above the plane sees no shadow.
         Shadows on the ground fade with its surface, where there is one.
         """
-        if not receiver.faces(viewer) or not (len(fans) or len(meshes) or len(surfaces)):
+        if not receiver.seen_by(viewer) or not (len(fans) or len(meshes) or len(surfaces)):
             return
         sources = self._sources(settings, viewer, receiver)
         if not sources:

@@ -201,6 +201,16 @@ class TestOnTheGround:
         np.testing.assert_array_equal(picture(table, self.CAMERA), picture(matrices=self.CAMERA))
 
 
+def test_where_it_is_not_seen_nothing_is_marked(renderer, wall, picture):
+    renderer.add_mesh(solid_model(TOWER), placed((0, 0, 0.5)))
+    before = renderer.memory["shadow marks"]
+    for beside in (filling(1.0, center=(2.5, 0, 0)), looking((0, 0, 2), (0, 0, 4)), looking((0, 0, -2))):
+        picture(wall, beside)
+        assert renderer.memory["shadow marks"] == before
+    picture(wall)
+    assert renderer.memory["shadow marks"] > before
+
+
 class TestRefusals:
     def test_a_surface_that_is_not_flat(self, renderer):
         corners, faces = [[0, 0, 0], [1, 0, 0], [1, 1, 0.5], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
