@@ -63,6 +63,16 @@ class Receiver:
             return np.eye(4)
         return window_around(self._corners(viewer))
 
+    def middle(self, viewer: Viewer) -> NDArray[np.float64]:
+        """A point (3,) for all of it: of a ground below the eye; below the picture's middle, if the eye is far off."""
+        if self.mesh is not None:
+            return mesh_corners(self.mesh)[0].mean(axis=0)
+        eye = viewer.eye
+        if eye[3] == 0:
+            eye = np.linalg.solve(viewer.clip_from_world, [0.0, 0.0, 0.0, 1.0])
+            eye = eye / eye[3]
+        return eye[:3] - self.ground.plane @ eye * self.ground.normal
+
     def _corners(self, viewer: Viewer) -> NDArray[np.float64]:
         """Of the mesh's bounding box, clip space, (8, 4)."""
         assert self.mesh is not None

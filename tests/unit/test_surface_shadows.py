@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from impostor.errors import SettingsError
-from impostor.lighting import DirectionalLight
+from impostor.lighting import DirectionalLight, LocalLight
 from impostor.model import Model
 from impostor.ptm.polynomials import Polynomials
 from impostor.ptm.quantise import quantise
@@ -139,6 +139,15 @@ class TestOnAWall:
         both = after[SIZE // 2, [SIZE // 4, SIZE * 3 // 4], 0].astype(float) / before[SIZE // 2, SIZE // 2, 0]
         # Five in six of the light are gone on the right, one in six on the left.
         np.testing.assert_allclose(both**2.2, (5 / 6, 1 / 6), atol=0.03)
+
+    def test_a_lamp_goes_on_shining_in_the_shadow_of_the_sun(self, renderer, wall, picture):
+        renderer.lights, lamp = [DirectionalLight((0, 0, 1), (0.5, 0.5, 0.5))], LocalLight((0, 0, 20), (200, 200, 200))
+        renderer.local_lights = [lamp]
+        renderer.add_mesh(solid_model(TOWER), placed((0, 0, 0.5)))
+        shadow = picture(wall)
+        renderer.lights = []
+        middle = SIZE // 2, SIZE // 2
+        np.testing.assert_allclose(shadow[middle].astype(int), picture()[middle], atol=2)
 
     def test_light_from_behind_casts_nothing(self, renderer, wall, picture):
         renderer.lights = [DirectionalLight((1, 0, -1))]
