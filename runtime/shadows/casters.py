@@ -93,7 +93,8 @@ def casters_for(
     clip, ground, window = viewer.clip_from_world, receiver.ground, receiver.window(viewer)
     found = []
     for fan in fans:
-        cast = CastingFan.of(fan.instances, viewer, ground, fan.levels and fan.levels.fan_share)
+        share = fan.levels and fan.levels.fan_share
+        cast = CastingFan.of(fan.instances, viewer, ground, share, receiver.stood_on)
         # The shadow of a fan lies between where it meets the picture's feet and where the light casts it.
         between = clip @ cast.records["rows"].astype(float), clip[None]
         found.append(Casters(cast, cast.corners(), between, receiver, window))

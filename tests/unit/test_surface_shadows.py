@@ -77,6 +77,18 @@ class TestOnAWall:
             renderer.add(solid_fan(TOWER, views=32, elevation_deg=0, size=128), at)
         assert iou(picture(wall).max(axis=-1) == 0, across(-0.9, -0.1)) > 0.9
 
+    def test_a_fan_casts_where_its_mesh_does_seen_from_above(self, renderer, picture):
+        """Nothing has its feet on a wall, for the shadow to meet them."""
+        renderer.lights, renderer.ambient = [DirectionalLight((3, 0.5, 0.35))], 0
+        wall = renderer.add_surface(GREY, rectangle(8, 4), world_from_model=placed((0, 1, 0)))
+        ball, at, above = Sphere((0, 0.6, 0), 0.4), (0, 0, 0.35), looking((1, 5, 3))
+        fan = renderer.add(solid_fan(ball, views=64, elevation_deg=15, size=128), at)
+        strips = picture(wall, above)
+        renderer.remove(fan)
+        renderer.add_mesh(solid_model(ball), placed(at))
+        bare = picture(matrices=above)
+        assert iou(apart(strips, bare) > 20, apart(picture(wall, above), bare) > 20) > 0.95
+
     def test_what_is_behind_it_casts_nothing(self, renderer, wall, picture):
         renderer.add_mesh(solid_model(TOWER), placed((0.2, 0, -0.5)))
         renderer.add(solid_fan(TOWER, views=8, size=32), (-0.2, 0, -0.6))
