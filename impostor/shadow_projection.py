@@ -130,8 +130,8 @@ def along_light(points: ArrayLike, toward_light: ArrayLike, ground: Ground) -> N
     Parameters
     ----------
     points : array_like, (..., 3) float
-        World space. A point under the ground goes to the place above it: what is buried casts no shadow, and the
-        shadow of a post starts where the post enters the ground.
+        World space. What is under the ground casts no shadow, and its points go the other way: so a straight edge that
+        enters the ground keeps its place, and its shadow ends there.
     toward_light : array_like, (3,) float
         World space; need not be unit length. `casts_shadow` must hold for it.
     ground : Ground
@@ -142,8 +142,7 @@ def along_light(points: ArrayLike, toward_light: ArrayLike, ground: Ground) -> N
     """
     points, toward_light = np.asarray(points, float), np.asarray(toward_light, float)
     height = (points @ ground.normal - ground.offset)[..., None]
-    slope = toward_light / (ground.normal @ toward_light)
-    return points - np.maximum(height, 0) * slope - np.minimum(height, 0) * ground.normal
+    return points - height * (toward_light / (ground.normal @ toward_light))
 
 
 def plane_from_world(view: View, world_from_model: NDArray[np.floating[Any]]) -> NDArray[np.float64]:

@@ -370,7 +370,8 @@ class ImpostorRenderer(LightSettings, FanSettings):
 
         Depth is tested against what is drawn already and not written. Every light that is above the ground casts, with
         a penumbra where it has a softness, and so do the brightest lights of rooms; see `shadow_lights` and
-        `contact_shadows`.
+        `contact_shadows`. Local lights cast none; where they light a surface, each is taken to light all of it as it
+        does its middle.
 
         Parameters
         ----------

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from PIL import Image
+from PIL import Image, UnidentifiedImageError
 from scipy.ndimage import distance_transform_edt
 
 from impostor.errors import ModelError, ModelWarning, SettingsError
@@ -112,6 +112,9 @@ def read_normals(files: ModelFiles, name: str, read: Callable[[], np.ndarray | N
         return None
     if found is None:
         return None
+    if (found[..., :1] == found[..., 1:3]).all():
+        warn(files, f"normal map of material '{name}' is grey, as heights are; drawn without it")
+        return None
     empty = found[..., 2] < LEAST_BLUE
     if empty.all():
         warn(files, f"normal map of material '{name}': blue is below {LEAST_BLUE} everywhere; drawn without it")
@@ -144,6 +147,8 @@ def decode_texture(files: ModelFiles, data: bytes, place: str) -> np.ndarray:
             return pixels(image)
     except ModelError:
         raise
+    except UnidentifiedImageError as error:
+        raise ModelError(files.path, f"{place} cannot be decoded; expected an image") from error
     except Exception as error:
         raise ModelError(files.path, f"{place} cannot be decoded ({error}); expected an image") from error
 

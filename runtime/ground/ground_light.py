@@ -14,9 +14,8 @@ from impostor.environment.colormap import diffuse_light
 from impostor.environment.environment import Environment
 from impostor.environment.light_cut import in_world
 from impostor.environment.room import Room
-from impostor.lighting import DirectionalLight
+from impostor.lighting import DirectionalLight, LocalLight
 from impostor.shadow_projection import Ground, casts_shadow
-from runtime.viewing.viewer import Viewer
 
 LEAST_SHARE = 0.02
 """Of the ground's light; a shadow that a room casts with less is not seen."""
@@ -64,8 +63,9 @@ def ground_light(
     ambient: ArrayLike,
     rooms: Sequence[Room],
     room_lights: Sequence[Sequence[DirectionalLight]],
-    viewer: Viewer,
+    at: NDArray[np.floating],
     ground: Ground,
+    lamps: Sequence[LocalLight] = (),
 ) -> GroundLight:
     """Whose light the ground shows.
 
@@ -74,15 +74,18 @@ def ground_light(
     lights : sequence of DirectionalLight
     ambient : array_like, (3,) float
     rooms : sequence of Room
-        Several are weighted for the point of the ground below the viewer.
+        Several are weighted for `at`.
     room_lights : sequence of sequence of DirectionalLight
         The brightest lights of each room, whose light is a part of the room's.
-    viewer : Viewer
+    at : ndarray, (3,) float
+        A point of the ground, metres.
     ground : Ground
+    lamps : sequence of LocalLight
+        They cast nothing here; all of the ground counts as lit by them as it is at `at`.
     """
     own = [(light, _given(light, ground)) for light in lights]
     around, of_rooms = np.array(np.broadcast_to(np.asarray(ambient, float), (3,))), []
-    weights = diffuse_weights(rooms, _below(viewer, ground)) if len(rooms) else ()
+    weights = diffuse_weights(rooms, at) if len(rooms) else ()
     for room, bright, weight in zip(rooms, room_lights, weights, strict=True):
         diffuse = weight * room_diffuse(room, ground.normal)
         around += diffuse
@@ -90,7 +93,8 @@ def ground_light(
         parts = [weight * _given(light, ground) for light in bright]
         most = np.minimum(1, diffuse / np.maximum(_sum(parts), 1e-9))
         of_rooms += [(light, part * most) for light, part in zip(bright, parts, strict=True)]
-    total = np.maximum(around + _sum([part for _, part in own]), 1e-9)
+    others = [part for _, part in own] + [_of_lamp(lamp, at, ground) for lamp in lamps]
+    total = np.maximum(around + _sum(others), 1e-9)
     of_rooms = [(light, part) for light, part in of_rooms if np.max(part / total) > LEAST_SHARE]
     casters = [
         Caster(light, part / total)
@@ -105,14 +109,12 @@ def _given(light: DirectionalLight, ground: Ground) -> NDArray[np.float64]:
     return max(float(ground.normal @ light.toward), 0.0) * np.array(light.color)
 
 
+def _of_lamp(lamp: LocalLight, at: NDArray[np.floating], ground: Ground) -> NDArray[np.float64]:
+    """What a lamp gives the ground at a point, (3,)."""
+    apart = np.array(lamp.position) - at
+    distance = max(float(np.linalg.norm(apart)), 1e-9)
+    return max(float(ground.normal @ apart), 0.0) / distance / max(distance, lamp.radius) ** 2 * np.array(lamp.color)
+
+
 def _sum(parts: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     return np.sum([np.zeros(3), *parts], axis=0)
-
-
-def _below(viewer: Viewer, ground: Ground) -> NDArray[np.float64]:
-    """The point of the ground below the eye; of an orthographic viewer, below the middle of the picture."""
-    eye = viewer.eye[:3]
-    if viewer.eye[3] == 0:
-        eye = np.linalg.solve(viewer.clip_from_world, [0.0, 0.0, 0.0, 1.0])
-        eye = eye[:3] / eye[3]
-    return eye - (ground.normal @ eye - ground.offset) * ground.normal

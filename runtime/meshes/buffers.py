@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +13,7 @@ from runtime.gl.programs import set_uniforms
 from runtime.gl.state import set_state
 from runtime.gl.uploads import SRGB8_ALPHA8, InstanceBuffer, check_texture_size
 from runtime.meshes.bump import Bump, BumpTexture, with_tangents
+from runtime.meshes.flat import ModelPlane, model_plane
 
 ALPHA_MODES = {"OPAQUE": 0, "MASK": 1, "BLEND": 2}
 BASE_UNIT, LIGHTS_UNIT, BUMP_UNIT, ROOMS_UNIT = range(4)  # of textures
@@ -98,6 +101,11 @@ class MeshBuffers:
         self.parts = [MeshPart(ctx, part, self.origin, self._white, self._bumps) for part in parts]
         self._arrays: dict[tuple[int, int | None], list[moderngl.VertexArray]] = {}
         self.triangle_count = model.triangle_count
+
+    @cached_property
+    def plane(self) -> ModelPlane:
+        """The plane that the model lies in if it is flat."""
+        return model_plane(self.model)
 
     @property
     def bumped(self) -> bool:

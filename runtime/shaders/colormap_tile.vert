@@ -26,7 +26,7 @@ void main() {
     int row = int(number), part = gl_InstanceID;
     factor = folded ? albedo.rgb * parts.x + parts.y : vec3(part == 0 ? parts.x : parts.y);
     factor *= of_all + dot(weights, of_weights) + dot(chosen, of_chosen);
-    // Equals runtime.relight.tile_origins.
+    // Equals runtime.fans.colormap_pass.tile_origins.
     origin = 16 * ivec2(row % 2 * parts_drawn + part, row / 2);
     origin_in_made = 16 * ivec2(row % 2, row / 2);
     x_axis = turn * right;

@@ -10,6 +10,7 @@ in vec4 tint;
 in vec4 row_0, row_1, row_2;  // of the copy's world_from_model
 out vec2 v_uv;
 out float v_alpha;
+out float v_out;  // of the ground, metres
 
 void main() {
     vec4 point = vec4(position, 1.0);
@@ -17,4 +18,5 @@ void main() {
     gl_Position = clip_from_world * vec4(on_ground(world, ground, toward_light), 1.0);
     v_uv = uv;
     v_alpha = tint.a;
+    v_out = out_of_ground(world, ground);
 }

@@ -13,6 +13,7 @@ in vec4 tint;
 in vec4 row_0, row_1, row_2;  // of the copy's world_from_model
 out vec2 v_uv;
 out float v_alpha;
+out float v_out;  // of the ground, metres
 flat out uint v_points;
 out float v_step;
 
@@ -23,6 +24,7 @@ void main() {
     gl_Position = clip_from_world * vec4(on_ground(world, ground, toward_points[number]), 1.0);
     v_uv = uv;
     v_alpha = tint.a;
+    v_out = out_of_ground(world, ground);
     int width = 24 / count;
     v_points = (0xFFFFFFu >> (24 - width)) << (number * width);
     v_step = step_between(step_at_metre, dot(ground, vec4(world, 1.0)), gl_Position.w);

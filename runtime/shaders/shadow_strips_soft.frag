@@ -3,8 +3,10 @@
 #include "shadow_points.glsl"
 flat in uint v_points;
 in float v_step;
+in float v_out;
 out uint mark;
 
 void main() {
+    if (v_out < 0.0) discard;
     mark = mark_of(v_points, v_step);
 }

@@ -13,10 +13,12 @@ in float step_at_metre;
 in uint points;
 flat out uint v_points;
 out float v_step;
+out float v_out;  // of the ground, metres
 
 void main() {
     vec3 world = placed(point, position_scale, turn);
     vec4 p = vec4(on_ground(world, ground, toward_light), 1.0);
+    v_out = out_of_ground(world, ground);
     float height = dot(ground, vec4(world, 1.0));
     vec4 at_feet = vec4(dot(row0, p), dot(row1, p), dot(row2, p), dot(row3, p));
     vec4 seen = mix(at_feet, p, above_feet(height, position_scale.w));

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from impostor.lighting import DirectionalLight
-from impostor.shadow_projection import Ground
+from impostor.shadow_projection import Ground, along_light
 
 CELL = 32
 EDGE = 2
@@ -33,15 +33,10 @@ def shadow_hulls(
 
     Returns
     -------
-    ndarray, (N, 8 or 16, 4) float64
-        World space, homogeneous. The corners' shadows; where a box reaches under the ground also the places above
-        them, because what is buried goes there (`along_light`).
+    ndarray, (N, 8, 4) float64
+        World space, homogeneous: the corners' shadows, `along_light`.
     """
-    toward = np.array(light.toward)
-    height = (corners @ ground.normal - ground.offset)[..., None]
-    points = corners - height * (toward / (ground.normal @ toward))
-    if height.size and height.min() < 0:
-        points = np.concatenate([points, corners - height * ground.normal], axis=1)
+    points = along_light(corners, light.toward, ground)
     return points @ world_from_shadow[:, :, :3].swapaxes(1, 2) + world_from_shadow[:, None, :, 3]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +30,7 @@ class Casters:
     ----------
     copies : CastingFan or MeshCopies
     corners : ndarray, (N, 8, 3) float64
-        Of their bounding boxes, world space.
+        Of their bounding boxes, world space; those of a flat mesh lie in its plane.
     world_from_shadow : tuple of ndarray, (N or 1, 4, 4) float64
         From the true shadow: to where it may be seen.
     clip_from_world : ndarray, (4, 4) float64
@@ -52,18 +53,22 @@ class Casters:
 
     def shadows(self, lights: Sequence[DirectionalLight]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Which copies (M,) cast what may be seen, and hulls (M, K, 4) of their shadows from all lights, clip space."""
-        ground = self.receiver.ground
-        hulls = [shadow_hulls(self.corners, each, light, ground) for light in lights for each in self.world_from_shadow]
-        hull = np.concatenate(hulls, axis=1)
+        ground, front = self.receiver.ground, np.flatnonzero(self.in_front)
+        corners = self.corners[front]
+        places = [each if len(each) == 1 else each[front] for each in self.world_from_shadow]
+        hull = np.concatenate([shadow_hulls(corners, each, light, ground) for light in lights for each in places], 1)
         seen = hull @ self.clip_from_world.T
-        chosen = self._in_front & in_view(seen)
+        chosen = in_view(seen)
         if self.receiver.mesh is not None:
             chosen &= in_view(hull @ self.receiver.box_from_world.T)
-        return np.flatnonzero(chosen), seen[chosen]
+        return front[chosen], seen[chosen]
 
-    @property
-    def _in_front(self) -> NDArray[np.bool_]:
-        """What lies behind the receiver casts nothing on it; nor does a surface in its plane, such as itself."""
+    @cached_property
+    def in_front(self) -> NDArray[np.bool_]:
+        """Which copies (N,) reach out of the receiver's plane to its lit side: others cast nothing on it.
+
+        A surface that lies in the plane, such as the receiver itself, does not.
+        """
         heights = self.corners @ self.receiver.ground.normal - self.receiver.ground.offset
         size = np.abs(self.corners - self.corners[:, :1]).max(axis=(1, 2))
         return heights.max(axis=1) > (-FLUSH if self.stand else FLUSH) * size
@@ -96,7 +101,8 @@ def casters_for(receiver: Receiver, viewer: Viewer, casting: Casting) -> list[Ca
     clip, ground, itself = viewer.clip_from_world, receiver.ground, np.eye(4)[None]
     found = []
     for fan in casting.fans:
-        cast = CastingFan.of(fan.instances, viewer, ground, fan.levels and fan.levels.fan_share)
+        share = fan.levels and fan.levels.fan_share
+        cast = CastingFan.of(fan.instances, viewer, ground, share, receiver.stood_on)
         # The shadow of a fan lies between where it meets the picture's feet and where the light casts it.
         between = cast.records["rows"].astype(float), itself
         found.append(Casters(cast, cast.corners(), between, clip, receiver))

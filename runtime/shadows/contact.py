@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import moderngl
 import numpy as np
@@ -20,6 +20,7 @@ from runtime.lights.contact_settings import ContactShadows
 from runtime.meshes.buffers import MeshBuffers
 from runtime.meshes.copies import MeshCopies
 from runtime.shadows.bounds import in_view
+from runtime.shadows.casters import Casters
 from runtime.shadows.footprints import LIFTS, SIDE, Footprint, fan_footprint, model_footprint
 from runtime.shadows.strips import CastingFan
 from runtime.viewing.viewer import Viewer
@@ -32,18 +33,13 @@ TURNS = 12  # steps of the up direction between which a mesh keeps its footprint
 MOST_FOOTPRINTS = 64  # of one mesh, each turned another way
 
 
-class CopiesGroup(Protocol):
-    """Copies of a fan or of a mesh."""
-
-    @property
-    def copies(self) -> CastingFan | MeshCopies: ...
-
-
 class _Placed(NamedTuple):
     """Copies that share a footprint."""
 
     footprint: Footprint
     texture: moderngl.Texture
+    which: NDArray[np.intp]
+    """(N,): of all copies."""
     positions: NDArray[np.float64]
     """(N, 3): of the model's origin."""
     axes: NDArray[np.float64]
@@ -72,7 +68,7 @@ class ContactPass:
 
     def draw(
         self,
-        groups: Sequence[CopiesGroup],
+        groups: Sequence[Casters],
         clip_from_world: NDArray[np.float64],
         viewer: Viewer,
         ground: Ground,
@@ -82,7 +78,7 @@ class ContactPass:
 
         Parameters
         ----------
-        groups : sequence of CopiesGroup
+        groups : sequence of Casters
         clip_from_world : ndarray, (4, 4) float64
             Of the channel.
         viewer : Viewer
@@ -99,7 +95,8 @@ class ContactPass:
             for placed in self._placed(group.copies, ground, settings.reach):
                 records = _records(placed, ground)
                 hull = _hulls(records, viewer.clip_from_world)
-                chosen = np.flatnonzero(in_view(hull) & (records["lift"] < 1))
+                near = group.in_front[placed.which] & (records["lift"] < 1)
+                chosen = np.flatnonzero(near & in_view(hull))
                 if len(chosen):
                     set_state(blend=(ONE, ONE_MINUS_SOURCE_COLOR))
                     placed.texture.use(0)
@@ -114,7 +111,8 @@ class ContactPass:
             fan, index = copies.instances.fan, copies.seen.index
             held = self._footprint((id(fan),), fan, partial(fan_footprint, fan, reach))
             axes = copies.seen.scale[:, None, None] * rotation_about_y(copies.instances.yaws[index]).swapaxes(1, 2)
-            yield _Placed(*held, copies.instances.positions[index], axes, copies.records["rows"])
+            positions, every = copies.instances.positions[index], np.arange(len(index))
+            yield _Placed(*held, every, positions, axes, copies.records["rows"])
             return
         linear = copies.world_from_model[:, :3, :3]
         up = ground.normal @ linear
@@ -127,7 +125,7 @@ class ContactPass:
             held = self._footprint((id(copies.buffers), *turn.tolist()), copies.buffers, make)
             turned = (linear[which] @ axes.T).swapaxes(1, 2)
             rows = np.broadcast_to(np.eye(4), (len(which), 4, 4))
-            yield _Placed(*held, copies.world_from_model[which, :3, 3], turned, rows)
+            yield _Placed(*held, which, copies.world_from_model[which, :3, 3], turned, rows)
 
     def _footprint(
         self, key: tuple[object, ...], owner: Fan | MeshBuffers, make: Callable[[], Footprint]

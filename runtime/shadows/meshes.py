@@ -17,8 +17,11 @@ from runtime.shadows.soft_light import MOST_POINTS, source_points, step_at_metre
 
 
 def mesh_corners(meshes: MeshCopies) -> NDArray[np.float64]:
-    """World-space corners (N, 8, 3) of the copies' bounding boxes."""
+    """World-space corners (N, 8, 3) of the copies' bounding boxes, which have no height where the model is flat."""
     corners, matrices = box_corners(*meshes.buffers.model.bounds), meshes.world_from_model
+    normal, point, _, flat = meshes.buffers.plane
+    if flat:
+        corners = corners - ((corners - point) @ normal)[:, None] * normal
     return corners @ matrices[:, :3, :3].swapaxes(1, 2) + matrices[:, None, :3, 3]
 
 

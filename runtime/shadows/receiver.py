@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from impostor.shadow_projection import Ground
 from runtime.meshes.copies import MeshCopies, MeshInstance
+from runtime.shadows.bounds import in_view
+from runtime.shadows.meshes import mesh_corners
 from runtime.surfaces.surface_pass import Surface
 from runtime.viewing.viewer import Viewer
 
@@ -46,9 +48,13 @@ class Receiver:
         return cls(surface.plane(), copies, id(surface))
 
     def seen_by(self, viewer: Viewer) -> bool:
-        """Whether a viewer may see it, and from the lit side."""
-        in_view = self.mesh is None or bool(viewer.sees(*self.mesh.spheres).any())
-        return in_view and bool(self.ground.plane @ viewer.eye > 0)
+        """Whether a viewer may see something of the lit side."""
+        if not self.ground.plane @ viewer.eye > 0:
+            return False
+        if self.mesh is None:
+            return True
+        clip = viewer.clip_from_world
+        return bool(in_view(mesh_corners(self.mesh) @ clip[:, :3].T + clip[:, 3])[0])
 
     @property
     def stood_on(self) -> bool:
@@ -67,3 +73,13 @@ class Receiver:
         # The axis along the normal does not count.
         box[np.abs(box[:3, :3] @ self.ground.normal * half).argmax()] = 0
         return box
+
+    def middle(self, viewer: Viewer) -> NDArray[np.float64]:
+        """A point (3,) for all of it: of a ground below the eye; below the picture's middle, if the eye is far off."""
+        if self.mesh is not None:
+            return mesh_corners(self.mesh)[0].mean(axis=0)
+        eye = viewer.eye
+        if eye[3] == 0:
+            eye = np.linalg.solve(viewer.clip_from_world, [0.0, 0.0, 0.0, 1.0])
+            eye = eye / eye[3]
+        return eye[:3] - self.ground.plane @ eye * self.ground.normal

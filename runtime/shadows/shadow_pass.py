@@ -71,7 +71,9 @@ class ShadowPass:
 
     def _sources(self, settings: LightSettings, viewer: Viewer, receiver: Receiver) -> list[Mark]:
         bright = self._bright_lights.of(settings.rooms, settings.shadow_lights)
-        light = ground_light(settings.lights, settings.ambient, settings.rooms, bright, viewer, receiver.ground)
+        lamps = () if receiver.mesh is None else settings.local_lights
+        lights, at = (settings.lights, settings.ambient, settings.rooms, bright), receiver.middle(viewer)
+        light = ground_light(*lights, at, receiver.ground, lamps)
         sources, contact = [Mark(*caster) for caster in light.casters], settings.contact_shadows
         if contact is not None and light.even.any() and receiver.stood_on:
             sources.append(Mark(contact, contact.strength * light.even))

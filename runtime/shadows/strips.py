@@ -50,14 +50,24 @@ class CastingFan:
 
     @classmethod
     def of(
-        cls, instances: Instances, viewer: Viewer, ground: Ground, fan_share: NDArray[np.float32] | None = None
+        cls,
+        instances: Instances,
+        viewer: Viewer,
+        ground: Ground,
+        fan_share: NDArray[np.float32] | None = None,
+        stand: bool = True,
     ) -> CastingFan:
-        """Set up for a viewer; copies that are meshes, by their fan's share (N,), cast where their mesh would."""
+        """Set up for a viewer.
+
+        Copies that are meshes, by their fan's share (N,), cast where their mesh would, and so do copies that do not
+        stand on the ground.
+        """
         seen = quads_toward(instances, viewer.eye)
         texel = 2 * instances.fan.views.radius.mean() / instances.fan.size * seen.scale
         pixels = texel * viewer.pixels_per_metre(seen.origin)
-        records = _records(instances, seen, viewer, ground)
-        if fan_share is not None:
+        records = _records(instances, seen)
+        records["rows"] = _to_feet(instances, seen, viewer, ground) if stand else np.eye(4)
+        if stand and fan_share is not None:
             share = fan_share.take(seen.index)[:, None, None]
             records["rows"] = share * records["rows"] + (1 - share) * np.eye(4, dtype=np.float32)
         return cls(instances, seen, records, pixels)
@@ -244,14 +254,19 @@ def _halved(
     return 4 * covered > side * side, (total // np.maximum(covered, 1)).astype(np.uint16)
 
 
-def _records(instances: Instances, seen: Quads, viewer: Viewer, ground: Ground) -> NDArray[np.void]:
-    """Placement, and `shadow_projection.viewer_ground_from_ground`, of many instances at once."""
-    views = instances.fan.views
+def _records(instances: Instances, seen: Quads) -> NDArray[np.void]:
+    """Placement (N,) CASTER_DTYPE of many instances; their rows are still to be set."""
     casters = np.zeros(len(seen), CASTER_DTYPE)
     yaws = instances.yaws[seen.index]
     casters["position_scale"][:, :3] = instances.positions[seen.index]
     casters["position_scale"][:, 3] = seen.scale
     casters["turn"] = np.stack([np.cos(yaws), np.sin(yaws)], axis=-1)
+    return casters
+
+
+def _to_feet(instances: Instances, seen: Quads, viewer: Viewer, ground: Ground) -> NDArray[np.float64]:
+    """`shadow_projection.viewer_ground_from_ground` of many instances at once, (N, 4, 4)."""
+    views = instances.fan.views
     plane_from_world = np.zeros((len(seen), 3, 4))
     plane_from_world[:, :, :3] = seen.basis
     plane_from_world[:, :, 3] = -np.einsum("nij,nj->ni", seen.basis, seen.origin)
@@ -274,5 +289,4 @@ def _records(instances: Instances, seen: Quads, viewer: Viewer, ground: Ground) 
     beyond = w <= 0
     rows /= np.where(beyond, 1, w)[:, None, None]
     rows[level | beyond] = np.eye(4)
-    casters["rows"] = rows
-    return casters
+    return rows

@@ -20,14 +20,13 @@ from impostor.shadow_projection import Ground
 from runtime.checks import check_type, numbers
 from runtime.gl.programs import load_program, set_uniforms
 from runtime.gl.state import CallerState, set_state
+from runtime.meshes.flat import ModelPlane, model_plane
 from runtime.meshes.mesh_pass import OUTPUTS
 from runtime.rooms.as_lights import RoomLights
 from runtime.surfaces.buffers import Light, SurfaceBuffers, bind_lights, lights_at
 from runtime.surfaces.relit_pictures import MOST_TERMS, RelitPicture, RelitPictures, bind_terms, packed_terms
 from runtime.surfaces.textures import KINDS, PtmTextures
 from runtime.viewing.viewer import Viewer
-
-FLAT = 1e-4  # of a model's radius: what reaches no farther out of a plane is flat
 
 
 @dataclass(eq=False)
@@ -88,25 +87,18 @@ class Surface:
         SettingsError
             A model that is not flat.
         """
-        normal, point = self._flat
+        normal, point, off, flat = self._model_plane
+        if not flat:
+            out = f"reaches {off:g} m out of a plane" if normal.any() else "faces every way as much as its opposite"
+            raise SettingsError("surface", f"{self.model.name} {out}; expected a flat model to cast on")
         matrix = self.matrix()
         # Uniform scale: normals turn as the model does.
         normal = matrix[:3, :3] @ normal
         return Ground(normal, float(normal @ (matrix[:3, :3] @ point + matrix[:3, 3])))
 
     @cached_property
-    def _flat(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Normal (3,) and a point (3,) of the model's plane, model space."""
-        positions = np.concatenate([part.positions for part in self.model.primitives]).astype(float)
-        normal = np.concatenate([part.normals for part in self.model.primitives]).astype(float).sum(axis=0)
-        normal /= max(float(np.linalg.norm(normal)), 1e-9)
-        middle = positions.mean(axis=0)
-        off = float(np.abs((positions - middle) @ normal).max())
-        if not off <= FLAT * self.model.radius or not np.linalg.norm(normal) > 0.5:
-            raise SettingsError(
-                "surface", f"{self.model.name} reaches {off:g} m out of a plane; expected a flat model to cast on"
-            )
-        return normal, middle
+    def _model_plane(self) -> ModelPlane:
+        return model_plane(self.model)
 
 
 def rectangle(width: float, height: float) -> Model:

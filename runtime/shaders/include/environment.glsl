@@ -1,5 +1,5 @@
 // Light from all around. Equals impostor.environment.cube.sample of an environment's levels and of its diffuse light.
-uniform sampler2D environments;  // as runtime.environments lays them out
+uniform sampler2D environments;  // as runtime.rooms.environments lays them out
 const float DIFFUSE_SIZE = 32.0;
 
 // Column and row on a face, -1 to 1, and the face's number.
@@ -31,7 +31,7 @@ float footprint_of(vec3 toward) {
     return sqrt(max(dot(right, right), dot(up, up)));
 }
 
-// Equals runtime.environments.level_origin; `prefiltered` is 1 for the levels of roughness.
+// Equals runtime.rooms.environments.level_origin; `prefiltered` is 1 for the levels of roughness.
 vec2 level_origin(float size, float level, float level_size, float prefiltered) {
     vec2 first = vec2(0.0, 2.0 * size + 4.0), others = vec2(12.0 * (0.25 * size - level_size + level - 2.0), 3.0 * size + 8.0);
     vec2 origin = level < 0.5 ? vec2(0.0) : level < 1.5 ? first : others;

@@ -12,7 +12,7 @@ ivec2 texel_here() {
     return clamp(ivec2(gl_FragCoord.xy) + v_shift, v_first, v_last);
 }
 
-// As runtime.relight.ColormapPass lays them out.
+// As runtime.fans.colormap_pass.ColormapPass lays them out.
 vec4 colormap_entry(float code, int table) {
     int number = int(code * 255.0 + 0.5);
     ivec2 tile = ivec2(2 * (v_row & 1) + table, v_row >> 1);

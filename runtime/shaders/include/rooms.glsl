@@ -1,7 +1,7 @@
 // Rooms: light that reaches a point of the world. Equals impostor.environment.room and impostor.environment.blending.
 const int MAX_ROOMS = 4;
 const int ROWS = 9;
-uniform vec4 rooms[MAX_ROOMS * ROWS];  // as runtime.environments packs them
+uniform vec4 rooms[MAX_ROOMS * ROWS];  // as runtime.rooms.environments packs them
 const float WALL = 1e-4;  // of the half size: what stands on a wall is inside
 const float EDGE = 0.1;   // as impostor.environment.blending has it
 

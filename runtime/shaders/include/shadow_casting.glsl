@@ -1,9 +1,12 @@
-// Along a light onto the ground; what is buried goes to the place above it. Equals
-// impostor.shadow_projection.along_light.
+// Along a light onto the ground. Equals impostor.shadow_projection.along_light.
 vec3 on_ground(vec3 world, vec4 ground, vec3 toward_light) {
-    float height = dot(ground, vec4(world, 1.0));
-    vec3 slope = toward_light / dot(ground.xyz, toward_light);
-    return world - max(height, 0.0) * slope - min(height, 0.0) * ground.xyz;
+    return world - dot(ground, vec4(world, 1.0)) / dot(ground.xyz, toward_light) * toward_light;
+}
+
+// Below 0 what is buried, and casts nothing; what may be under the ground by rounding only is not.
+float out_of_ground(vec3 world, vec4 ground) {
+    vec4 point = vec4(world, 1.0);
+    return dot(ground, point) + 1e-6 * dot(abs(ground), abs(point));
 }
 
 vec3 placed(vec3 point, vec4 position_scale, vec2 turn) {

@@ -80,6 +80,15 @@ def test_what_was_expected_follows_a_semicolon(name):
     assert not [text for text in texts if isinstance(text, str) and ", expected " in text]
 
 
+def test_shaders_name_modules_that_there_are():
+    shaders = [path for package in PACKAGES for path in ROOT.glob(f"{package}/shaders/**/*.*")]
+    named = {
+        name for path in shaders for name in re.findall(r"\b(?:impostor|bake|runtime)\.[\w.]*\w", path.read_text())
+    }
+    modules = {name.removesuffix(".py").replace("/", ".") for name in FILES}
+    assert len(named) > 5 and not {name for name in named if not {name, name.rpartition(".")[0]} & modules}
+
+
 def test_heavy_dependencies_have_one_way_in():
     (trimesh,) = importers("trimesh")
     assert trimesh == "impostor/model.py"

@@ -23,6 +23,12 @@ def test_links_lead_somewhere(name):
     assert not missing
 
 
+def test_nothing_is_left_of_a_merge():
+    marks = re.compile(r"^(<{7}|>{7}) ", re.MULTILINE)
+    pages = [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("examples/*.md"), *ROOT.glob("scenes/*.toml")]
+    assert len(pages) > 10 and not [page.name for page in pages if marks.search(page.read_text())]
+
+
 def test_every_convention_has_its_test():
     named = re.findall(r"`(tests/[\w/]+\.py)(?:::(\w+))?`", (ROOT / "CONVENTIONS.md").read_text())
     assert len(named) > 15

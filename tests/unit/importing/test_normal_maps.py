@@ -333,7 +333,11 @@ def test_a_missing_map_is_told_and_the_model_is_drawn(tmp_path, allowed):
 
 @pytest.mark.parametrize(
     ("content", "problem"),
-    [(b"no picture", "cannot be decoded"), (encoded(np.zeros((4, 4, 3))), "blue is below 128 everywhere")],
+    [
+        (b"no picture", "cannot be decoded; expected an image; drawn"),
+        (encoded(np.tile([9, 8, 7], (4, 4, 1))), "blue is below 128 everywhere"),
+        (encoded(np.full((4, 4, 3), 255)), "is grey, as heights are"),
+    ],
 )
 def test_a_map_that_is_none_is_told(tmp_path, content, problem):
     (tmp_path / "skin.png").write_bytes(content)

@@ -103,9 +103,10 @@ def test_points_go_along_the_light_to_the_ground():
     np.testing.assert_allclose(np.cross(points - shadow, light), 0, atol=1e-12)
 
 
-def test_a_buried_point_stays_over_where_it_is():
-    shadow = along_light([[1.0, -2.0, 3.0]], direction(0.3, 0.2), LEVEL)
-    np.testing.assert_allclose(shadow, [[1, 0, 3]], atol=1e-12)
+def test_an_edge_that_enters_the_ground_casts_a_straight_line_through_where_it_does():
+    above, entry, buried = along_light([[0.0, 1, 0], [1, 0, 0], [3, -2, 0]], direction(0.3, 0.2), LEVEL)
+    np.testing.assert_allclose(entry, [1, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(buried - entry, 2 * (entry - above), atol=1e-12)
 
 
 @pytest.mark.parametrize(

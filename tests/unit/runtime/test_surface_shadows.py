@@ -4,15 +4,17 @@ import numpy as np
 import pytest
 
 from impostor.errors import SettingsError
-from impostor.lighting import DirectionalLight
+from impostor.lighting import DirectionalLight, LocalLight
+from impostor.model import Model
 from impostor.ptm.polynomials import Polynomials
 from impostor.ptm.quantise import quantise
 from impostor.shadow_projection import Ground
+from impostor.views import rotation_about_y
 from runtime import ContactShadows, ImpostorRenderer, Offscreen
 from runtime.ground.ground_pass import GroundSurface
 from runtime.surfaces.surface_pass import lying_on, rectangle
 from tests.pictures import apart, filling, iou, looking, placed
-from tests.solids import Box, solid_fan, solid_model
+from tests.solids import Box, Sphere, solid_fan, solid_model
 
 SIZE = 128
 LEVEL = Ground((0, 1, 0))
@@ -75,14 +77,52 @@ class TestOnAWall:
             renderer.add(solid_fan(TOWER, views=32, elevation_deg=0, size=128), at)
         assert iou(picture(wall).max(axis=-1) == 0, across(-0.9, -0.1)) > 0.9
 
+    def test_a_fan_casts_where_its_mesh_does_seen_from_above(self, renderer, picture):
+        """Nothing has its feet on a wall, for the shadow to meet them."""
+        renderer.lights, renderer.ambient = [DirectionalLight((3, 0.5, 0.35))], 0
+        wall = renderer.add_surface(GREY, rectangle(8, 4), world_from_model=placed((0, 1, 0)))
+        ball, at, above = Sphere((0, 0.6, 0), 0.4), (0, 0, 0.35), looking((1, 5, 3))
+        fan = renderer.add(solid_fan(ball, views=64, elevation_deg=15, size=128), at)
+        strips = picture(wall, above)
+        renderer.remove(fan)
+        renderer.add_mesh(solid_model(ball), placed(at))
+        bare = picture(matrices=above)
+        assert iou(apart(strips, bare) > 20, apart(picture(wall, above), bare) > 20) > 0.95
+
     def test_what_is_behind_it_casts_nothing(self, renderer, wall, picture):
         renderer.add_mesh(solid_model(TOWER), placed((0.2, 0, -0.5)))
         renderer.add(solid_fan(TOWER, views=8, size=32), (-0.2, 0, -0.6))
         np.testing.assert_array_equal(picture(wall), picture())
 
+    @pytest.mark.parametrize("softness_deg", [0, 3])
+    @pytest.mark.parametrize("kind", ["mesh", "fan"])
+    def test_what_is_stuck_in_it_casts_with_what_stands_out(self, renderer, wall, picture, kind, softness_deg):
+        """Of a ball a cap, so flat that all of it is lit: nothing is dark but what it stands on."""
+        renderer.lights = [DirectionalLight((1, 0, 1), softness=np.radians(softness_deg))]
+        ball = Sphere((0, 0, 0), 0.5)
+        if kind == "mesh":
+            renderer.add_mesh(solid_model(ball), placed((0, 0, -0.45)))
+        else:
+            renderer.add(solid_fan(ball, views=32, elevation_deg=0, size=128), (0, 0, -0.45))
+        x = (np.arange(SIZE) + 0.5) * 2 / SIZE - 1
+        away = np.hypot(x, x[:, None]) > np.sqrt(0.5**2 - 0.45**2) + 2 / SIZE
+        np.testing.assert_array_equal(picture(wall)[away], picture()[away])
+
     def test_neither_does_it_on_itself_nor_what_goes_on_beside_it(self, renderer, wall, picture):
         renderer.add_surface(GREY, rectangle(1, 1), world_from_model=placed((1.2, 0, 0)))
         np.testing.assert_array_equal(picture(wall), picture())
+
+    def test_neither_does_a_model_at_a_slant_to_its_own_axes(self, renderer, picture):
+        renderer.lights, renderer.ambient = [SIDE], 0
+        turn = rotation_about_y(0.5) @ rotation_about_y(0.4)[[1, 2, 0]][:, [1, 2, 0]]
+        (flat,) = rectangle(2, 2).primitives
+        slanted = Model.from_arrays(flat.positions @ turn.T, flat.triangles, flat.normals @ turn.T, uvs=flat.uvs)
+        back = np.eye(4)
+        back[:3, :3] = turn.T
+        wall = renderer.add_surface(GREY, slanted, world_from_model=back)
+        np.testing.assert_array_equal(picture(wall), picture())
+        renderer.add_mesh(solid_model(TOWER), placed((0, 0, 0.5)))
+        assert iou(picture(wall).max(axis=-1) == 0, across(-0.9, -0.1)) > 0.9
 
     def test_another_wall_casts_on_it(self, renderer, wall, picture):
         renderer.add_surface(GREY, rectangle(0.2, 1), world_from_model=placed((0.8, 0, 0.8), np.pi / 2))
@@ -111,6 +151,15 @@ class TestOnAWall:
         both = after[SIZE // 2, [SIZE // 4, SIZE * 3 // 4], 0].astype(float) / before[SIZE // 2, SIZE // 2, 0]
         # Five in six of the light are gone on the right, one in six on the left.
         np.testing.assert_allclose(both**2.2, (5 / 6, 1 / 6), atol=0.03)
+
+    def test_a_lamp_goes_on_shining_in_the_shadow_of_the_sun(self, renderer, wall, picture):
+        renderer.lights, lamp = [DirectionalLight((0, 0, 1), (0.5, 0.5, 0.5))], LocalLight((0, 0, 20), (200, 200, 200))
+        renderer.local_lights = [lamp]
+        renderer.add_mesh(solid_model(TOWER), placed((0, 0, 0.5)))
+        shadow = picture(wall)
+        renderer.lights = []
+        middle = SIZE // 2, SIZE // 2
+        np.testing.assert_allclose(shadow[middle].astype(int), picture()[middle], atol=2)
 
     def test_light_from_behind_casts_nothing(self, renderer, wall, picture):
         renderer.lights = [DirectionalLight((1, 0, -1))]
@@ -161,15 +210,42 @@ class TestOnTheGround:
         assert (apart(picture(floor, self.CAMERA), bare) > 20).any()
         np.testing.assert_array_equal(picture(wall, self.CAMERA), bare)
 
+    @pytest.mark.parametrize("kind", ["mesh", "fan"])
+    def test_what_is_under_it_touches_it_nowhere(self, renderer, picture, kind):
+        """As what stands under a table."""
+        renderer.lights, renderer.ambient, renderer.contact_shadows = [], 0.6, ContactShadows(1.0, 1.0)
+        table = renderer.add_surface(GREY, rectangle(4, 4), world_from_model=lying_on(LEVEL))
+        if kind == "mesh":
+            renderer.add_mesh(solid_model(TOWER), placed((0, -0.6, 0)))
+        else:
+            renderer.add(solid_fan(TOWER, views=8, size=32), (0, -0.6, 0))
+        np.testing.assert_array_equal(picture(table, self.CAMERA), picture(matrices=self.CAMERA))
+
+
+def test_where_it_is_not_seen_nothing_is_marked(renderer, wall, picture):
+    renderer.add_mesh(solid_model(TOWER), placed((0, 0, 0.5)))
+    before = renderer.memory["shadow marks"]
+    for beside in (filling(1.0, center=(2.5, 0, 0)), looking((0, 0, 2), (0, 0, 4)), looking((0, 0, -2))):
+        picture(wall, beside)
+        assert renderer.memory["shadow marks"] == before
+    picture(wall)
+    assert renderer.memory["shadow marks"] > before
+
 
 class TestRefusals:
     def test_a_surface_that_is_not_flat(self, renderer):
-        bent = solid_model(TOWER)
-        bent = renderer.add_surface(GREY, type(bent).from_arrays(
-            [[0, 0, 0], [1, 0, 0], [1, 1, 0.5], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], uvs=np.zeros((4, 2)), name="sail"
-        ))  # fmt: skip
+        corners, faces = [[0, 0, 0], [1, 0, 0], [1, 1, 0.5], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
+        bent = renderer.add_surface(GREY, Model.from_arrays(corners, faces, uvs=np.zeros((4, 2)), name="sail"))
         with pytest.raises(SettingsError, match=r"sail reaches 0\.\d+ m out of a plane; expected a flat model"):
             renderer.draw_shadows(*AHEAD, bent)
+
+    def test_a_sheet_with_two_fronts(self, renderer):
+        corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+        faces, normals = [[0, 1, 2], [3, 5, 4]], [[0, 0, 1]] * 3 + [[0, 0, -1]] * 3
+        sheet = Model.from_arrays(corners * 2, faces, normals, uvs=np.zeros((6, 2)), name="sheet")
+        sheet = renderer.add_surface(GREY, sheet)
+        with pytest.raises(SettingsError, match="sheet faces every way as much as its opposite; expected a flat model"):
+            renderer.draw_shadows(*AHEAD, sheet)
 
     def test_a_surface_of_another_renderer(self, ctx, renderer):
         other = ImpostorRenderer(ctx, cache_side=64)
