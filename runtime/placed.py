@@ -6,8 +6,11 @@ from collections.abc import Iterator
 
 import moderngl
 
+from impostor.errors import SettingsError
 from impostor.fan import Fan
 from impostor.model import Model
+from impostor.shadow_projection import Ground
+from runtime.checks import check_type
 from runtime.fans.batch import Batch
 from runtime.fans.lod import LevelOfDetail, Levels
 from runtime.fans.textures import FanTextures
@@ -16,6 +19,8 @@ from runtime.instances.instances import Instances
 from runtime.meshes.buffers import MeshBuffers
 from runtime.meshes.bump import Bump
 from runtime.meshes.copies import MeshInstance
+from runtime.shadows.casters import Casting
+from runtime.shadows.receiver import Receiver
 from runtime.surfaces.surface_pass import Surface
 
 
@@ -90,8 +95,27 @@ class Placed:
         """Those that are drawn and cast shadows."""
         return [mesh for mesh in self.meshes if mesh.visible]
 
-    def casting(self, surface: Surface) -> MeshInstance:
-        """The mesh that casts shadows in a surface's place."""
+    def casting(self) -> Casting:
+        """All that casts shadows."""
+        return Casting(self.batches, self.visible_meshes, [self._in_place_of(surface) for surface in self.surfaces])
+
+    def receiver(self, ground: Ground | Surface) -> Receiver:
+        """What shadows are to fall on.
+
+        Raises
+        ------
+        SettingsError
+            Neither a ground nor a flat surface of this renderer.
+        """
+        if not isinstance(ground, Surface):
+            check_type("ground", ground, Ground, " or a Surface")
+            return Receiver(ground)
+        if not self.holds(ground):
+            raise SettingsError("ground", "a Surface that is not in this renderer; expected one that is")
+        return Receiver.of(ground, self._in_place_of(ground))
+
+    def _in_place_of(self, surface: Surface) -> MeshInstance:
+        """The mesh that casts and receives shadows for a surface."""
         mesh = self._casting[id(surface)]
         mesh.world_from_model = surface.matrix()
         return mesh

@@ -35,8 +35,6 @@ from runtime.meshes.mesh_pass import OUTPUTS, MeshPass
 from runtime.placed import Placed
 from runtime.rooms.environments import RoomTable, check_rooms
 from runtime.rooms.room_pass import RoomPass, number_of, to_show
-from runtime.shadows.casters import Casting
-from runtime.shadows.receiver import Receiver
 from runtime.shadows.shadow_pass import ShadowPass
 from runtime.surfaces.surface_pass import Surface, SurfacePass
 from runtime.viewing.viewer import Viewer
@@ -387,19 +385,13 @@ class ImpostorRenderer(LightSettings, FanSettings):
         SettingsError
             A surface that is not flat, or not in this renderer.
         """
+        receiver = self._placed.receiver(ground)
         if surface is not None:
             check_type("surface", surface, GroundSurface)
-        placed = self._placed
-        if isinstance(ground, Surface):
-            if not placed.holds(ground):
-                raise SettingsError("ground", "a Surface that is not in this renderer; expected one that is")
-            receiver = Receiver.of(ground, placed.casting(ground))
-        else:
-            check_type("ground", ground, Ground, " or a Surface")
-            receiver = Receiver(ground)
+            if receiver.mesh is not None:
+                raise SettingsError("surface", "given for shadows on a Surface; expected it with a Ground")
         with self._frame(clip_from_view, view_from_world) as (state, viewer):
-            casting = Casting(placed.batches, placed.visible_meshes, [placed.casting(each) for each in placed.surfaces])
-            self._shadows.draw(state, casting, viewer, self, receiver, surface)
+            self._shadows.draw(state, self._placed.casting(), viewer, self, receiver, surface)
 
     @contextmanager
     def _frame(self, clip_from_view: ArrayLike, view_from_world: ArrayLike) -> Iterator[tuple[CallerState, Viewer]]:

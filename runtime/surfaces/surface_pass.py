@@ -92,8 +92,8 @@ class Surface:
             out = f"reaches {off:g} m out of a plane" if normal.any() else "faces every way as much as its opposite"
             raise SettingsError("surface", f"{self.model.name} {out}; expected a flat model to cast on")
         matrix = self.matrix()
-        # Uniform scale: normals turn as the model does.
-        normal = matrix[:3, :3] @ normal
+        # Uniform scale: normals turn as the model does, and a mirrored model shows its light on the other side.
+        normal = matrix[:3, :3] @ normal * np.sign(np.linalg.det(matrix[:3, :3]))
         return Ground(normal, float(normal @ (matrix[:3, :3] @ point + matrix[:3, 3])))
 
     @cached_property

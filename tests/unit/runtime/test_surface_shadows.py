@@ -177,6 +177,17 @@ class TestOnAWall:
         np.testing.assert_array_equal(picture(wall), before)
 
 
+def test_a_mirrored_wall_has_its_shadows_where_it_shows_light(renderer, picture):
+    """A PTM's normal is the cross of its picture's right and up: mirrored, a wall that faced +Z is lit from -Z."""
+    renderer.lights, renderer.ambient = [SIDE], 0.5
+    wall = renderer.add_surface(GREY, rectangle(2, 2), world_from_model=np.diag([-1.0, 1, 1, 1]))
+    renderer.add_mesh(solid_model(TOWER), placed((0, 0, 0.5)))
+    lit = picture()
+    np.testing.assert_array_equal(picture(wall), lit)
+    renderer.lights = []
+    np.testing.assert_array_equal(picture(), lit)
+
+
 class TestOnTheGround:
     CAMERA = looking((3, 4, 5), (0, 0, 0))
 
@@ -246,6 +257,10 @@ class TestRefusals:
         sheet = renderer.add_surface(GREY, sheet)
         with pytest.raises(SettingsError, match="sheet faces every way as much as its opposite; expected a flat model"):
             renderer.draw_shadows(*AHEAD, sheet)
+
+    def test_a_ground_that_fades_with_a_surface(self, renderer, wall):
+        with pytest.raises(SettingsError, match="surface: given for shadows on a Surface; expected it with a Ground"):
+            renderer.draw_shadows(*AHEAD, wall, GroundSurface())
 
     def test_a_surface_of_another_renderer(self, ctx, renderer):
         other = ImpostorRenderer(ctx, cache_side=64)
