@@ -79,7 +79,8 @@ def main() -> int:
             say(f"table {name}")
             started = time.monotonic()
             try:
-                made.append(TABLES[name](bench))
+                with bench.ctx:  # a table before may have left another current, or none
+                    made.append(TABLES[name](bench))
             except Exception:
                 traceback.print_exc()
                 failed.append(name)
