@@ -43,7 +43,7 @@ class Placed:
         self.batches: list[Batch] = []
         self.meshes: list[MeshInstance] = []
         self.surfaces: list[Surface] = []
-        self._casting: dict[int, MeshInstance] = {}
+        self._stand_ins: dict[int, MeshInstance] = {}
 
     def add(self, instances: Instances, model: Model | None, level_of_detail: LevelOfDetail | None) -> None:
         """Take copies of a fan, and the mesh that they are near the camera."""
@@ -58,7 +58,7 @@ class Placed:
 
     def add_surface(self, surface: Surface) -> None:
         """Take a surface."""
-        self._casting[id(surface)] = MeshInstance(self.mesh_buffers(surface.model))
+        self._stand_ins[id(surface)] = MeshInstance(self.mesh_buffers(surface.model))
         self.surfaces.append(surface)
 
     def remove(self, placed: object) -> list[Fan]:
@@ -67,7 +67,7 @@ class Placed:
         meshes = [mesh for mesh in self.meshes if mesh is placed]
         if any(surface is placed for surface in self.surfaces):
             self.surfaces = [surface for surface in self.surfaces if surface is not placed]
-            meshes.append(self._casting.pop(id(placed)))
+            meshes.append(self._stand_ins.pop(id(placed)))
         self.batches = [batch for batch in self.batches if batch.instances is not placed]
         self.meshes = [mesh for mesh in self.meshes if mesh is not placed]
         gone = [batch for batch in batches if not any(each.textures is batch.textures for each in self.batches)]
@@ -97,7 +97,7 @@ class Placed:
 
     def casting(self) -> Casting:
         """All that casts shadows."""
-        return Casting(self.batches, self.visible_meshes, [self._in_place_of(surface) for surface in self.surfaces])
+        return Casting(self.batches, self.visible_meshes, [self._stand_in(surface) for surface in self.surfaces])
 
     def receiver(self, ground: Ground | Surface) -> Receiver:
         """What shadows are to fall on.
@@ -112,11 +112,11 @@ class Placed:
             return Receiver(ground)
         if not self.holds(ground):
             raise SettingsError("ground", "a Surface that is not in this renderer; expected one that is")
-        return Receiver.of(ground, self._in_place_of(ground))
+        return Receiver.of(ground, self._stand_in(ground))
 
-    def _in_place_of(self, surface: Surface) -> MeshInstance:
+    def _stand_in(self, surface: Surface) -> MeshInstance:
         """The mesh that casts and receives shadows for a surface."""
-        mesh = self._casting[id(surface)]
+        mesh = self._stand_ins[id(surface)]
         mesh.world_from_model = surface.matrix()
         return mesh
 
@@ -132,7 +132,7 @@ class Placed:
         return {id(owner.buffers): owner.buffers for owner in self._owners()}
 
     def _owners(self) -> Iterator[MeshInstance | Levels]:
-        yield from (*self.meshes, *self.levels, *self._casting.values())
+        yield from (*self.meshes, *self.levels, *self._stand_ins.values())
 
     def release(self) -> None:
         """Free everything on the GPU."""
@@ -143,4 +143,4 @@ class Placed:
         self.batches.clear()
         self.meshes.clear()
         self.surfaces.clear()
-        self._casting.clear()
+        self._stand_ins.clear()

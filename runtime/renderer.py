@@ -383,7 +383,7 @@ class ImpostorRenderer(LightSettings, FanSettings):
         Raises
         ------
         SettingsError
-            A surface that is not flat, or not in this renderer.
+            A surface that is not flat, or not in this renderer; a `GroundSurface` for one.
         """
         receiver = self._placed.receiver(ground)
         if surface is not None:

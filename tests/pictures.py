@@ -3,6 +3,7 @@
 import numpy as np
 
 from impostor.views import rotation_about_y
+from runtime.gl.offscreen import Offscreen
 from runtime.viewing.cameras import Camera
 
 
@@ -29,6 +30,30 @@ def cropped(clip_from_view, column, row, parts):
     crop = np.diag([parts, parts, 1.0, 1.0])
     crop[0, 3], crop[1, 3] = parts - 1 - 2 * column, -(parts - 1 - 2 * row)
     return crop @ clip_from_view
+
+
+def mesh_picture(renderer, screen, model, matrices=None, output="lit", place=None, **options):
+    """One mesh by itself; the camera fills the picture with the unit square if not given, `options` as `add_mesh`."""
+    mesh = renderer.add_mesh(model, place, **options)
+    screen.clear()
+    renderer.draw_meshes(*(matrices or filling()), output=output)
+    renderer.remove(mesh)
+    return screen.color()
+
+
+def assert_parts_are_the_whole(ctx, screen, draw, matrices):
+    """A picture is what 4 x 4 pictures of its parts show, each culled for itself; `screen` is 64 x 64."""
+    whole = Offscreen(ctx, 256, 256)
+    whole.clear()
+    draw(*matrices, output="albedo")
+    expected = whole.color()
+    whole.release()
+    for row in range(4):
+        for column in range(4):
+            screen.clear()
+            draw(cropped(matrices[0], column, row, 4), matrices[1], output="albedo")
+            part = expected[64 * row : 64 * row + 64, 64 * column : 64 * column + 64]
+            assert (apart(screen.color(), part) > 4).sum() < 6, (row, column)
 
 
 def iou(found, expected):

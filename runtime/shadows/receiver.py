@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from impostor.errors import SettingsError
 from impostor.shadow_projection import Ground
 from runtime.meshes.copies import MeshCopies, MeshInstance
 from runtime.shadows.bounds import in_view
@@ -44,8 +45,15 @@ class Receiver:
         SettingsError
             A surface that is not flat.
         """
+        normal, point, off, flat = mesh.buffers.plane
+        if not flat:
+            out = f"reaches {off:g} m out of a plane" if normal.any() else "faces every way as much as its opposite"
+            raise SettingsError("surface", f"{surface.model.name} {out}; expected a flat model to cast on")
         (copies,) = MeshCopies.gathered([mesh])
-        return cls(surface.plane(), copies, id(surface))
+        turn, place = copies.world_from_model[0, :3, :3], copies.world_from_model[0, :3, 3]
+        # Uniform scale: normals turn as the model does, and a mirrored model shows its light on the other side.
+        normal = turn @ normal * np.sign(np.linalg.det(turn))
+        return cls(Ground(normal, float(normal @ (turn @ point + place))), copies, id(surface))
 
     def seen_by(self, viewer: Viewer) -> bool:
         """Whether a viewer may see something of the lit side."""

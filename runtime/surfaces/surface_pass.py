@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import moderngl
 import numpy as np
@@ -20,7 +19,6 @@ from impostor.shadow_projection import Ground
 from runtime.checks import check_type, numbers
 from runtime.gl.programs import load_program, set_uniforms
 from runtime.gl.state import CallerState, set_state
-from runtime.meshes.flat import ModelPlane, model_plane
 from runtime.meshes.mesh_pass import OUTPUTS
 from runtime.rooms.as_lights import RoomLights
 from runtime.surfaces.buffers import Light, SurfaceBuffers, bind_lights, lights_at
@@ -78,27 +76,6 @@ class Surface:
         if not abs(np.linalg.det(matrix)) > 0:
             raise SettingsError("surface", "world_from_model has no inverse; expected a matrix that has one")
         return matrix
-
-    def plane(self) -> Ground:
-        """The plane in the world that a flat model lies in, its normal on the model's front.
-
-        Raises
-        ------
-        SettingsError
-            A model that is not flat.
-        """
-        normal, point, off, flat = self._model_plane
-        if not flat:
-            out = f"reaches {off:g} m out of a plane" if normal.any() else "faces every way as much as its opposite"
-            raise SettingsError("surface", f"{self.model.name} {out}; expected a flat model to cast on")
-        matrix = self.matrix()
-        # Uniform scale: normals turn as the model does, and a mirrored model shows its light on the other side.
-        normal = matrix[:3, :3] @ normal * np.sign(np.linalg.det(matrix[:3, :3]))
-        return Ground(normal, float(normal @ (matrix[:3, :3] @ point + matrix[:3, 3])))
-
-    @cached_property
-    def _model_plane(self) -> ModelPlane:
-        return model_plane(self.model)
 
 
 def rectangle(width: float, height: float) -> Model:

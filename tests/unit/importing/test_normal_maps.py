@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from impostor.views import View, rotation_about_y
 from runtime.fans.lod import LevelOfDetail
 from runtime.meshes.bump import Bump
 from tests.data import SAMPLES
-from tests.pictures import apart, filling, placed
+from tests.pictures import apart, filling, mesh_picture, placed
 from tests.solids import Sphere, solid_model
 from tests.unit.importing.gltf_builder import GltfBuilder, encoded
 
@@ -82,14 +83,7 @@ def captured(model, size=32, basis=None):
 
 @pytest.fixture
 def draw(renderer, screen):
-    def drawn(model, matrices=None, output="normal", place=None, **options):
-        mesh = renderer.add_mesh(model, place, **options)
-        screen.clear()
-        renderer.draw_meshes(*(matrices or filling()), output=output)
-        renderer.remove(mesh)
-        return screen.color()
-
-    return drawn
+    return partial(mesh_picture, renderer, screen, output="normal")
 
 
 def as_bytes(normals):

@@ -13,7 +13,7 @@ from runtime import ImpostorRenderer, LevelOfDetail
 from runtime.fans.impostor_pass import _ascending
 from runtime.fans.textures import FanTextures
 from runtime.gl.offscreen import Offscreen
-from tests.pictures import apart, bluish, cropped, filling, iou, looking, placed
+from tests.pictures import apart, assert_parts_are_the_whole, bluish, filling, iou, looking, placed
 from tests.solids import BLUE, GREEN, RED, WHITE, Box, Sphere, card_fan, corner_card, solid_fan, solid_model
 
 BALL = Sphere(color=RED)
@@ -310,17 +310,7 @@ class TestManyCopies:
         fan = solid_fan(BALL, Box((-0.9, -1.2, -0.9), (0.9, -0.3, 0.9), GREEN),
                         views=8, size=64, elevation_deg=elevation, slopes=slopes)  # fmt: skip
         renderer.add(fan, [(0, 0, 0), (1.8, 0.3, -1), (-1.5, 0.8, -2)], [0, 1, 2])
-        whole = Offscreen(ctx, 256, 256)
-        whole.clear()
-        renderer.draw(*matrices, output="albedo")
-        expected = whole.color()
-        whole.release()
-        for row in range(4):
-            for column in range(4):
-                screen.clear()
-                renderer.draw(cropped(matrices[0], column, row, 4), matrices[1], output="albedo")
-                part = expected[64 * row : 64 * row + 64, 64 * column : 64 * column + 64]
-                assert (apart(screen.color(), part) > 4).sum() < 6, (row, column)
+        assert_parts_are_the_whole(ctx, screen, renderer.draw, matrices)
 
 
 class TestCrossfade:

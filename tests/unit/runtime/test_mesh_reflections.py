@@ -1,5 +1,7 @@
 """Polygon meshes in rooms: diffuse light, mirroring and bumps, worked out by hand."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -16,7 +18,7 @@ from runtime.gl.state import preserved_state
 from runtime.meshes.bump import Bump
 from runtime.meshes.copies import MeshCopies
 from runtime.viewing.viewer import Viewer
-from tests.pictures import filling, placed
+from tests.pictures import filling, mesh_picture, placed
 from tests.solids import Box, Sphere, solid_fan, solid_model
 
 CORNERS = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
@@ -44,14 +46,7 @@ def uneven(size=64):
 
 @pytest.fixture
 def draw(renderer, screen):
-    def drawn(model, matrices=None, output="lit", place=None, **options):
-        mesh = renderer.add_mesh(model, place, **options)
-        screen.clear()
-        renderer.draw_meshes(*(matrices or filling()), output=output)
-        renderer.remove(mesh)
-        return screen.color()
-
-    return drawn
+    return partial(mesh_picture, renderer, screen)
 
 
 def shown(linear):
