@@ -101,7 +101,7 @@ def render(
         ):
             if given:
                 raise SettingsError(flag, f"given with --output {show}; expected it with a lit picture")
-    toward = light or "0,0"
+    toward = "0,0" if light is None else light
     at = numbers("--light", toward, 2)
     shine = _highlight(specular)
     polynomials = read_ptm(ptm).polynomials()

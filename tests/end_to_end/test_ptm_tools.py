@@ -136,6 +136,7 @@ def test_a_small_ptm_is_quilted_from_smaller_patches(capsys, tmp_path):
     ("arguments", "message"),
     [
         (["render", "{ptm}", "-o", "a.png", "--light", "1"], "--light"),
+        (["render", "{ptm}", "-o", "a.png", "--light", ""], "--light"),
         (["render", "{ptm}", "-o", "a.png", "--light=0.9,0.9"], "lu² + lv² at most 1"),
         (["render", "{ptm}", "-o", "a.png", "--light", "nan,0"], "--light"),
         (["render", "{ptm}", "-o", "a.jpg"], "expected a name that ends in '.png'"),
